@@ -42,14 +42,14 @@ class Tag:
     """Place, y in the map frame."""
     heading: Annotated[float, Quantity(label="Tag heading", unit="rad", shown=DEGREES, step=0.01, decimals=6)] = 0.0
     """Direction of the tag's own x axis, map frame."""
-    anonymous: Annotated[bool, Switch("Anonymous tag")] = False
+    anonymous: Annotated[bool, Switch("Without id")] = False
     """Whether the camera cannot read which one it is, as of the contour of a dock."""
     sigma: Annotated[
-        float, Quantity(label="Tag place 1σ", unit="m", shown=MILLIMETRES, bounds=NOT_NEGATIVE, step=0.5, decimals=6)
+        float, Quantity(label="Placed 1σ", unit="m", shown=MILLIMETRES, bounds=NOT_NEGATIVE, step=0.5, decimals=6)
     ] = 0.003
     """1-sigma of its surveyed place, each axis: it does not average out."""
     heading_sigma: Annotated[
-        float, Quantity(label="Tag heading 1σ", unit="rad", shown=DEGREES, bounds=NOT_NEGATIVE, step=0.01, decimals=6)
+        float, Quantity(label="Facing 1σ", unit="rad", shown=DEGREES, bounds=NOT_NEGATIVE, step=0.01, decimals=6)
     ] = 0.003
     """1-sigma of its surveyed heading: it does not average out."""
 

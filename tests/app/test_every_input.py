@@ -525,9 +525,9 @@ OWN = {
             "x": Row(label="x [m]", read=mark("x"), **FAR),
             "y": Row(label="y [m]", read=mark("y"), **FAR),
             "heading": Row(label="Tag heading [°]", read=mark("heading"), factor=DEGREES, allowed=(-179.5, 90.25)),
-            "sigma": Row(label="Tag place 1σ [mm]", read=mark("sigma"), factor=MM, allowed=(0.0, 5.5), refused=(-0.1,)),
+            "sigma": Row(label="Placed 1σ [mm]", read=mark("sigma"), factor=MM, allowed=(0.0, 5.5), refused=(-0.1,)),
             "heading_sigma": Row(
-                label="Tag heading 1σ [°]",
+                label="Facing 1σ [°]",
                 read=mark("heading_sigma"),
                 factor=DEGREES,
                 allowed=(0.0, 1.25),

@@ -18,6 +18,8 @@ HALF = 0.12
 """Half the side of the square of a tag [m]."""
 ARROW = 0.35
 """Length of the arrow of its x axis [m]."""
+LABEL_ASIDE = 0.18
+"""From a tag to the corner of its name [m]: clear of its square, however that is turned."""
 MOST_LABELS = 60
 OUTLINE = np.array(
     [
@@ -60,7 +62,7 @@ class TagLayer(BaseLayer):
             self.scene.add_label(
                 f"/tags/names/{number}",
                 "tag, no id" if tag.anonymous else f"tag {tag.id}",
-                position=(tag.x, tag.y, theme.Height.LABEL),
+                position=(tag.x + LABEL_ASIDE, tag.y - LABEL_ASIDE, theme.Height.LABEL),
                 anchor="top-left",
                 font_screen_scale=0.7,
             )

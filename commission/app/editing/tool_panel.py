@@ -33,7 +33,7 @@ COMMANDS: tuple[Command, ...] = (
     ("Place reflectors", "R", None, ChooseTool(PlaceTool())),
     ("Draw a route", "T", None, ChooseTool(RouteTool())),
     ("Place stations", "K", None, ChooseTool(StationTool())),
-    ("Place tags", "G", None, ChooseTool(TagTool())),
+    ("Place tags", "A", None, ChooseTool(TagTool())),
     ("Measure", "M", None, ChooseTool(MeasureTool())),
     ("Finish what is drawn", "enter", None, Finish()),
     ("Cancel", "escape", None, Cancel()),
