@@ -36,7 +36,7 @@ CUT_OFF = """() => {
   if (play.length !== 5 || lines.size !== 1) found.push(`${play.length} buttons in ${lines.size} lines`);
   const floor = document.querySelector('canvas[data-engine]').getBoundingClientRect();
   const tools = [...document.querySelectorAll('div:has(>.c-rail)+div button')];
-  if (tools.length !== 9) found.push(`${tools.length} tools`);
+  if (tools.length !== 10) found.push(`${tools.length} tools`);
   const now = document.querySelector('.c-now'), end = now.getBoundingClientRect();
   const rows = [...now.querySelectorAll('tr')].map((each) => each.getBoundingClientRect());
   if (rows[0].top < end.top + 4) found.push('the first number of now is scrolled out');

@@ -7,7 +7,7 @@ from commission.app.base.icons import mask
 from commission.app.base.paints import Surface, Worded
 from commission.app.base.theme import BACKGROUND, LEFT_PX, RAIL_PX, RIGHT_PX, css
 
-TOOLS = 9
+TOOLS = 10
 """On the rail at the floor's edge, which share its height."""
 OPEN_EYE, SHUT_EYE = (
     mask(path)
