@@ -166,7 +166,7 @@ class GrowingRun:
             self._append(estimate)
             search = self._localizer.state.search
             if search is not None:
-                self._searches.append(SearchMoment(self._count - 1, search.told, search.track))
+                self._searches.append(SearchMoment(self._count - 1, search.told, search.track, search.agreed))
             if self._count % CHECKPOINT_CYCLES == 0:
                 self._checkpoints.append(Checkpoint(self._count, self._localizer.state))
         return estimate

@@ -157,6 +157,16 @@ def times_in_a_row(ranked: FloatArray, before: FloatArray, track: PoseGaussian) 
     return 1.0 + (float(before[0, 11]) if again else 0.0)
 
 
+def is_same_place(one: PoseGaussian, other: PoseGaussian) -> bool:
+    """Whether two poses are one place.
+
+    Parameters
+    ----------
+    one, other : [m, m, rad], map frame.
+    """
+    return bool(_same(np.array([one[:3]]), np.array(other[:3]))[0])
+
+
 def _same(poses: FloatArray, other: FloatArray) -> BoolArray:
     """(n,) whether each of some poses is one place with another one."""
     apart = np.hypot(poses[:, 0] - other[0], poses[:, 1] - other[1])

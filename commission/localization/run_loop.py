@@ -244,7 +244,7 @@ def continued(log: RecordLog, setup: LocalizerSetup, state: FilterState, stretch
             state = _found(log, setup, search, (state, state), newest, NOT_YET)
         if cycles and state.search is not None and stretch.searches is not None:
             found = state.search
-            stretch.searches.append(SearchMoment(stretch.first + done - 1, found.told, found.track))
+            stretch.searches.append(SearchMoment(stretch.first + done - 1, found.told, found.track, found.agreed))
         if done == count and row == end:
             break
     if len(own) and count and detected.stamps_ns[-1] >= own[0]:

@@ -10,6 +10,7 @@ from scipy.spatial import KDTree
 
 from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.geometry.ray_kernels import RayTables
+from commission.localization.lasting import HARMLESS
 from commission.localization.odometry import OdometryNoise
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.reflector_index import Cells
@@ -47,6 +48,8 @@ class SearchMap(NamedTuple):
     """(S, 6) of the observation by each scanner, see `observation_rows`."""
     crowd: FloatArray
     """(N,) one over the reflectors within `CLOSE` of each row of `places`, itself among them."""
+    harmless: float
+    """What is seen of a reflector may lie that far beside it [m], see `contradiction`."""
 
 
 def search_map(setup: LocalizerSetup) -> SearchMap:
@@ -78,6 +81,7 @@ def search_map(setup: LocalizerSetup) -> SearchMap:
         anywhere(index.places),
         setup.observation_rows,
         read_only(1.0 / np.array([len(each) for each in close], dtype=np.float64)),
+        HARMLESS * setup.parameters.supervisor.position_limit,
     )
 
 

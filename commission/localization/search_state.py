@@ -52,6 +52,12 @@ class Search:
         """(H, ROW) hypotheses as they stand: by the way as a whole where scans see too little, else by things."""
         return self.explained if len(self.explained) else self.hypotheses
 
+    @property
+    def agreed(self) -> tuple[int, int]:
+        """Attempts in a row in which one place was left: by things that came back, and by the way as a whole."""
+        by_things, by_way = (int(each[0, 11]) if len(each) else 0 for each in (self.hypotheses, self.explained))
+        return by_things, by_way
+
     def _content(self) -> tuple[object, ...]:
         """All of it, comparable."""
         arrays = (
@@ -79,6 +85,8 @@ class SearchMoment(NamedTuple):
     """(H, ROW) see `Search`."""
     track: PoseGaussian
     """Pose of base in the frame of odometry at that cycle."""
+    agreed: tuple[int, int] = (0, 0)
+    """See `Search`."""
 
 
 NOTHING = PoseGaussian(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

@@ -19,6 +19,7 @@ from commission.localization.observation import ObservationModel, expect, observ
 from commission.localization.pose_gaussian import PoseGaussian, write_pose
 from commission.localization.reflector_index import Cells, cell_range
 from commission.localization.several_scans import carried
+from commission.localization.sightings import noise_on_floor
 
 OF_THE_MAP = 0.8
 """Share of the detections that are taken to be of reflectors, where the pose is right."""
@@ -46,6 +47,9 @@ FARTHEST = 2.0
 """Reflectors farther from a detection are not looked at [m]."""
 BEGIN = (0.3, 0.15)
 """1-sigma that each pose begins with, at the newest scan and at the oldest one: position [m], heading [rad]."""
+MET = 6
+"""Numbers of how a reflector was met: weight of its detections; times weight, how far they lie from its place, x and y
+[m], and their noise on the floor, xx, xy, yy [m^2]."""
 INFLATION = 2.25
 """Factor of the variance of a detection: errors of map, mounting and shape add to the sensor's, and stay."""
 
@@ -85,6 +89,7 @@ def follow(  # noqa: PLR0917 - a pose, the trail and the map
     cells: Cells,
     places: FloatArray,
     cell_offsets: IntArray,
+    met: FloatArray,
 ) -> Explained:
     """Lead a pose along a trail, from its first scan to its last or the other way.
 
@@ -98,6 +103,7 @@ def follow(  # noqa: PLR0917 - a pose, the trail and the map
     longest : range up to which anything is seen [m].
     crowd : (N,) one over the reflectors of the map that stand at the place of each, itself among them.
     cells, places, cell_offsets : the map, see `ReflectorIndex`.
+    met : (N, MET) out: how each reflector was met, see `trail_misfit`; (0, MET) where nobody asks.
 
     Notes
     -----
@@ -148,6 +154,9 @@ def follow(  # noqa: PLR0917 - a pose, the trail and the map
                     most[entry] = max(most[entry], math.log(ratio) if part > LEAST_PART else 0.0)
             if rivals:
                 pose = _mixed(pose, rivals, (1.0 - OF_THE_MAP) / ratio, odds / ratio, work)
+                if len(met):
+                    z, bearing = trail.seen[i, 0] - model.range_bias, trail.seen[i, 1]
+                    _meet(met, pose, z, bearing, model, places, counts * odds / ratio, rivals, work)
     for at in range(strangers):
         evidence += max(strange[at, 2], LEAST_OF_ONE)
     told = 0.0
@@ -181,6 +190,34 @@ def _unknown(  # noqa: PLR0917 - a pose and a detection
         count += 1
     strange[min(at, MOST_STRANGE - 1), 2] += gain
     return count
+
+
+@compiled_inline
+def _meet(  # noqa: PLR0917 - a pose and a detection
+    met: FloatArray,
+    pose: PoseGaussian,
+    measured: float,
+    bearing: float,
+    model: ObservationModel,
+    places: FloatArray,
+    odds: float,
+    rivals: int,
+    work: FloatArray,
+) -> None:
+    """Count how far a detection lies from the reflectors that it may be of."""
+    ox, oy = scanner_offset(pose.theta, model)
+    direction = pose.theta + model.mount_theta + bearing
+    x, y = pose.x + ox + measured * math.cos(direction), pose.y + oy + measured * math.sin(direction)
+    across = model.bearing_variance * measured * measured
+    xx, xy, yy = noise_on_floor(model.range_variance, across, direction)
+    for r in range(rivals):
+        entry, part = int(work[r, 10]), odds * work[r, 9]
+        met[entry, 0] += part
+        met[entry, 1] += part * (x - places[entry, 0])
+        met[entry, 2] += part * (y - places[entry, 1])
+        met[entry, 3] += part * xx
+        met[entry, 4] += part * xy
+        met[entry, 5] += part * yy
 
 
 @compiled_inline
@@ -366,12 +403,12 @@ def explain(  # noqa: PLR0917 - poses, the trail and the map
     Led back first, so that the odometry of the whole way does not move where the trail began; then forth from there,
     each with the same covariance. Evidence holds (2 pi)^(3/2) det(P)^(1/2) of it: of a density, by definition.
     """
-    position, heading = BEGIN[0] ** 2, BEGIN[1] ** 2
+    position, heading, nobody = BEGIN[0] ** 2, BEGIN[1] ** 2, np.zeros((0, MET))
     volume = 1.5 * math.log(2.0 * math.pi) + math.log(BEGIN[0] ** 2 * BEGIN[1])
     for h in range(len(poses)):
         begin = PoseGaussian(poses[h, 0], poses[h, 1], poses[h, 2], position, 0.0, 0.0, position, 0.0, heading)
-        back = follow(begin, False, trail, models, eyes, longest, crowd, cells, places, cell_offsets).pose
+        back = follow(begin, False, trail, models, eyes, longest, crowd, cells, places, cell_offsets, nobody).pose
         begin = PoseGaussian(back.x, back.y, back.theta, position, 0.0, 0.0, position, 0.0, heading)
-        of_it = follow(begin, True, trail, models, eyes, longest, crowd, cells, places, cell_offsets)
+        of_it = follow(begin, True, trail, models, eyes, longest, crowd, cells, places, cell_offsets, nobody)
         write_pose(explained[h], of_it.pose)
         explained[h, 9], explained[h, 10], explained[h, 11] = of_it.evidence + volume, of_it.share, of_it.places

@@ -13,7 +13,16 @@ import numpy as np
 
 from commission.geometry.arrays import FloatArray, read_only
 from commission.geometry.se2 import compose, inverse
-from commission.localization.hypotheses import ODDS, base_poses, each_place_once, prior_of, times_in_a_row
+from commission.localization.contradiction import Contradiction, contradiction
+from commission.localization.hypotheses import (
+    ODDS,
+    base_poses,
+    each_place_once,
+    gaussian_of,
+    is_same_place,
+    prior_of,
+    times_in_a_row,
+)
 from commission.localization.hypothesis_fit import NEGLIGIBLE, ROW, density
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.search_map import SearchMap
@@ -40,6 +49,8 @@ CONFIRMED = 3.0
 """Attempts in a row in which one hypothesis must be the only one left."""
 LEAST_SHARE = 0.6
 """Share of the detections that must be of reflectors by it."""
+MOST_CONTRADICTED = 1.0 / 3.0
+"""Share of the reflectors met that may stand elsewhere by it."""
 FEWEST_PLACES = 3.0
 """Places of the map that must have been seen by it."""
 
@@ -100,10 +111,10 @@ def explained_again(search: Search, belief: PoseGaussian | None, now_ns: int, ar
         around.offsets,
         explained,
     )
-    return replace(search, explained=read_only(_ranked(explained, search, around)), way=0.0)
+    return replace(search, explained=read_only(_ranked(explained, search, belief, around)), way=0.0)
 
 
-def _ranked(explained: FloatArray, search: Search, around: SearchMap) -> FloatArray:
+def _ranked(explained: FloatArray, search: Search, belief: PoseGaussian | None, around: SearchMap) -> FloatArray:
     """(H, ROW) hypotheses by their evidence, each place once, as `hypotheses` has them."""
     prior = prior_of(search, around)
     rows = np.zeros((len(explained), ROW))
@@ -120,7 +131,11 @@ def _ranked(explained: FloatArray, search: Search, around: SearchMap) -> FloatAr
     rows = rows[rows[:, 9] > rows[0, 9] - NEGLIGIBLE] if len(rows) else rows
     ranked = rows[each_place_once(base_poses(rows, search.track), KEPT)]
     if len(ranked) and _is_alone(ranked):
-        ranked[0, 11] = times_in_a_row(ranked, search.explained, search.track)
+        found = contradiction(gaussian_of(ranked[0], search.track), search.trail, around)
+        if _may_be_believed(ranked[0], found, search, belief, around):
+            ranked[0, 11] = times_in_a_row(ranked, search.explained, search.track)
+        # What lies beside its place on average is not drawn anew each time.
+        ranked[0, [3, 6]] += found.misfit
     return ranked
 
 
@@ -129,3 +144,14 @@ def _is_alone(ranked: FloatArray) -> bool:
     best, none = float(ranked[0, 9]), float(ranked[0, 12])
     others = float(np.exp(np.minimum(ranked[1:, 9] - best, 0.0)).sum())
     return others * ODDS <= 1.0 and math.exp(min(none - best, 0.0)) * ODDS_AGAINST_NONE <= 1.0
+
+
+def _may_be_believed(
+    best: FloatArray, found: Contradiction, search: Search, belief: PoseGaussian | None, around: SearchMap
+) -> bool:
+    """Whether a hypothesis contradicts few of the reflectors that it met, and no more than the filter's own belief."""
+    if found.contradicted > MOST_CONTRADICTED * found.met:
+        return False
+    if belief is None or not found.contradicted or not is_same_place(gaussian_of(best, search.track), belief):
+        return True
+    return contradiction(belief, search.trail, around).contradicted >= found.contradicted

@@ -22,6 +22,8 @@ from commission.localization.estimate import Mode, Status
 from commission.localization.observation import project_detections
 from commission.localization.relocalization import CONFIRMATIONS
 from commission.localization.run_columns import RunColumns
+from commission.localization.tags import USE, TagUse
+from commission.localization.trail_search import CONFIRMED
 from commission.progress import Progress, silent
 from commission.site.quantity import DEGREES, MILLIMETRES, PERCENT
 from commission.studies.bearing_figures import leaning
@@ -91,6 +93,8 @@ class RunEvent:
     """Limits of the supervisor at that time: position [m], heading [rad]."""
     names: tuple[str, str] = ("", "")
     """The reflector before and the one after, of a changed association; the two that are off most, of bearings."""
+    found_by: str = ""
+    """What told where a vehicle is that was found, in words."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -166,7 +170,8 @@ def _modes(run: RunResult) -> Iterator[RunEvent]:
             yield RunEvent(kind=EventKind.LOCATE if asked else EventKind.SEARCHING, time=time)
             continue
         if before[cycle] == Mode.INITIALIZING or (before[cycle] == Mode.LOST and _searches(run, cycle)):
-            yield RunEvent(kind=EventKind.FOUND, time=time, lasts=time - searched_from)
+            by = _found_by(run.columns, cycle)
+            yield RunEvent(kind=EventKind.FOUND, time=time, lasts=time - searched_from, found_by=by)
             continue
         held = run.held(cycle)
         yield RunEvent(
@@ -177,6 +182,21 @@ def _modes(run: RunResult) -> Iterator[RunEvent]:
             heading=held.heading,
             limits=(float(limits[cycle, 0]), float(limits[cycle, 1])),
         )
+
+
+def _found_by(columns: RunColumns, cycle: int) -> str:
+    """What told where the vehicle is, in words; the attempt of the cycle itself is the last one."""
+    tags, sought = columns.detected.tags, columns.search(cycle - 1)
+    if tags is not None and len(columns.tags) and tags.is_frame[cycle]:
+        rows = slice(int(tags.offsets[cycle]), int(tags.offsets[cycle + 1]))
+        if (columns.tags[rows, USE] == TagUse.LOCATED).any():
+            return "by a tag whose id was read"
+    by_things, by_way = (0, 0) if sought is None else sought.agreed
+    if by_things + 1 >= CONFIRMATIONS:
+        return f"the only place left in {CONFIRMATIONS} attempts"
+    if by_way + 1 >= CONFIRMED:
+        return f"the only place left in {int(CONFIRMED)} attempts by the whole way"
+    return "the only place left"
 
 
 def _searches(run: RunResult, cycle: int) -> bool:
@@ -364,7 +384,7 @@ def told(event: RunEvent) -> str:
         case EventKind.LOCATE:
             text = "asked for: the pose is thrown away, the vehicle looks for its place in the map"
         case EventKind.FOUND:
-            text = f"after {event.lasts:.2f} s, the only place left in {CONFIRMATIONS} attempts"
+            text = f"after {event.lasts:.2f} s, {event.found_by}"
         case EventKind.BLIND:
             text = f"nothing accepted for {event.lasts:.2f} s, {event.position:.2f} m"
         case EventKind.GAP:

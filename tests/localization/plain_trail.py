@@ -23,6 +23,8 @@ class PlainPose:
         self.survey = [survey[tuple(center)] for center in self.centers]
         self.gains, self.best = np.zeros(len(self.centers)), np.zeros(len(self.centers))
         self.strange, self.share, self.total, self.visible = [], 0.0, 0.0, 1
+        self.met = {j: [] for j in range(len(self.centers))}
+        """Weight of each detection of a reflector, how far beside it it lies [m], and its noise there [m^2]."""
 
     def lead(self, trail, *, forth):
         """Lead it from the first scan to the last, or back."""
@@ -94,6 +96,29 @@ class PlainPose:
         p = sum(w * (c + np.outer(d, d)) for w, d, c in zip(weights, shifts, spreads, strict=True))
         self.p, self.mean = p - np.outer(shift, shift), self.mean + shift
         self.mean[2] = wrap(self.mean[2])
+        sensor = se2.compose(self.mean, self.mounting)
+        direction = sensor[2] + z[1]
+        ray, across = np.array(
+            ((math.cos(direction), math.sin(direction)), (-math.sin(direction), math.cos(direction)))
+        )
+        noise = self.noise[0, 0] * np.outer(ray, ray) + self.noise[1, 1] * z[0] ** 2 * np.outer(across, across)
+        for weight, (j, *_) in zip(weights[1:], options, strict=True):
+            self.met[j].append((counts * weight, sensor[:2] + z[0] * ray - self.centers[j], noise))
+
+    def beside(self):
+        """How many reflectors were met, how many of them not where they are on average, and how far, squared."""
+        seen, beside, squares = set(), set(), []
+        for j, rows in self.met.items():
+            n = sum(row[0] for row in rows)
+            if n < 1.0:
+                continue
+            seen.add(j)
+            mean = sum(w * off for w, off, _ in rows) / n
+            noise = sum(w * each for w, _, each in rows) / n
+            squares.append(0.5 * (mean @ mean - np.trace(noise) / n))
+            if mean @ np.linalg.solve(noise / n + self.survey[j] * np.eye(2), mean) > 16.0:
+                beside.add(j)
+        return len(seen), len(beside), max(float(np.mean(squares)), 0.0)
 
     def told(self):
         """Evidence, share and places, see `Explained`."""

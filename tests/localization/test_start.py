@@ -161,6 +161,21 @@ def test_evidence_is_the_laplace_approximation_of_the_likelihood_ratio() -> None
     assert row[9] == pytest.approx(expected, rel=1e-6)
 
 
+def test_things_that_scatter_more_than_stated_tell_a_pose_less_surely() -> None:
+    # Six numbers of three things, three of a pose: what is left of (d / sigma)^2 has the mean 3.
+    things = TRIANGLE.centers + 1.8 * SIGMA * np.array([[1.0, 0.5], [-1.0, 0.5], [0.5, -1.0]])
+    row = judged((0.0, 0.0, 0.0), things)
+    assert row[10] == 3.0
+    c, s = math.cos(row[2]), math.sin(row[2])
+    on_floor = things @ np.array([[c, s], [-s, c]])
+    J = np.concatenate([[[1.0, 0.0, -y], [0.0, 1.0, x]] for x, y in on_floor])
+    left = (on_floor + row[:2] - TRIANGLE.centers) / SIGMA
+    misfit = (left**2).sum() / 3.0
+    assert misfit > 1.5
+    P = misfit * np.linalg.inv(J.T @ J / SIGMA**2)
+    np.testing.assert_allclose(row[3:9], P[np.triu_indices(3)], rtol=1e-3, atol=1e-9)
+
+
 def test_a_thing_that_is_no_reflector_changes_nothing() -> None:
     row = judged((0.0, 0.0, 0.0), TRIANGLE.centers)
     more = judged((0.0, 0.0, 0.0), np.vstack((TRIANGLE.centers, (5.0, 4.0))))

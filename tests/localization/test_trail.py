@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from commission.geometry import se2
+from commission.localization.contradiction import contradiction
 from commission.localization.estimate import Mode
 from commission.localization.hypotheses import hypotheses_of
 from commission.localization.localizer import Localizer
@@ -17,10 +18,11 @@ from commission.localization.search_map import search_map
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import FilterState, state_unlocated
 from commission.localization.trail import lengthened, no_trail
-from commission.localization.trail_fit import Trail, follow
+from commission.localization.trail_fit import MET, Trail, follow
 from commission.localization.whole_run import run, state_before
 from commission.site.parameters import ObservationParameters, Parameters, SupervisorParameters
 from commission.site.records import Detections
+from commission.site.reflectors import ReflectorMap
 from commission.site.scanner import Scanner
 from tests.localization.drives import Drive, Plan, random_drive, random_map
 from tests.localization.plain_trail import PlainPose
@@ -130,6 +132,7 @@ def test_a_pose_is_led_along_as_a_plain_filter_with_matrices_leads_it(forth: boo
         around.cells,
         around.places,
         around.offsets,
+        np.zeros((0, MET)),
     )
     plain = PlainPose(begin, p, setup, 8.0)
     plain.lead(trail, forth=forth)
@@ -137,6 +140,33 @@ def test_a_pose_is_led_along_as_a_plain_filter_with_matrices_leads_it(forth: boo
     upper = plain.p[np.triu_indices(3)]
     np.testing.assert_allclose(led.pose[3:], upper, rtol=1e-6, atol=1e-12)
     assert (led.evidence, led.share, led.places) == pytest.approx(plain.told(), rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize(("off", "beside_least"), [(0.0, 0), (0.25, 2)])
+def test_a_pose_contradicts_the_reflectors_that_what_it_sees_of_them_lies_beside(off: float, beside_least: int) -> None:
+    setup = setup_of(3)
+    drive = sparse_drive(setup, 3, dataclasses.replace(PLAN, scans=60))
+    places = [
+        dataclasses.replace(each, x=each.x + (off if k % 3 == 0 else 0.0))
+        for k, each in enumerate(setup.reflectors.reflectors)
+    ]
+    setup = dataclasses.replace(setup, reflectors=ReflectorMap(tuple(places)))
+    trail, around = trail_of(drive), search_map(setup)
+    assert around.harmless == 0.125
+    pose = PoseGaussian(*drive.truth[-1], 0.02**2, 0.0, 0.0, 0.02**2, 0.0, 0.01**2)
+    found = contradiction(pose, trail, around._replace(harmless=0.0))
+    longest = float(trail.seen[:, 0].max())
+    plain = PlainPose(drive.truth[-1], np.diag((0.02**2, 0.02**2, 0.01**2)), setup, longest)
+    plain.lead(trail, forth=False)
+    met, beside, misfit = plain.beside()
+    assert (found.met, found.contradicted) == (met, beside)
+    # A rival that lies at the edge of the gate, outside of the circle that is looked at, is left out: some 1e-4 of it.
+    assert found.misfit == pytest.approx(misfit, rel=1e-3, abs=1e-12)
+    assert met > 8
+    assert beside_least <= beside <= 4 * (off > 0.0)
+    assert (found.misfit > 0.05**2) == (off > 0.0)
+    # What moves nobody by a part of the supervisor's limit is no contradiction.
+    assert contradiction(pose, trail, around._replace(harmless=0.4)).contradicted == 0
 
 
 def test_a_trail_keeps_the_newest_of_the_way_and_no_scan_that_saw_nothing() -> None:

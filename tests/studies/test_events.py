@@ -13,6 +13,7 @@ from commission.geometry.arrays import read_only
 from commission.localization.estimate import Mode, Status
 from commission.localization.growing_run import GrowingRun
 from commission.localization.priors import KeptPriors, PriorRows
+from commission.localization.search_state import NOTHING, SearchMoment
 from commission.site.records import Detections, Odometry
 from commission.studies.events import MOST_OF_A_KIND, EventKind, EventsInput, RunEvent, events, told
 from commission.studies.run import RunResult
@@ -96,13 +97,24 @@ def test_what_is_not_searched_for_is_not_found(run: RunResult) -> None:
     ]
 
 
-def test_a_drive_that_nobody_has_located_says_so_and_when_it_was_found(run: RunResult) -> None:
+@pytest.mark.parametrize(
+    ("agreed", "by"),
+    [
+        ((4, 0), "the only place left in 5 attempts"),
+        ((1, 2), "the only place left in 3 attempts by the whole way"),
+    ],
+)
+def test_a_drive_that_nobody_has_located_says_so_and_when_and_how_it_was_found(
+    run: RunResult, agreed: tuple[int, int], by: str
+) -> None:
+    searches = (SearchMoment(24, read_only(np.empty((0, 13))), NOTHING, agreed),)
+    run = replace(run, columns=replace(run.columns, searches=searches))
     found = with_modes(run, [(range(25), Mode.INITIALIZING), (range(25, 30), Mode.FAIL)])
     seeking, located, again = events(EventsInput(found)).events
     assert (seeking.kind, seeking.time) == (EventKind.SEARCHING, 0.0)
     assert (located.kind, located.time, located.lasts) == (EventKind.FOUND, 2.5, 2.5)
     assert (again.kind, again.lasts) == (EventKind.RECOVERED, 3.0)
-    assert told(located) == "after 2.50 s, the only place left in 5 attempts"
+    assert told(located) == f"after 2.50 s, {by}"
 
 
 def test_a_drive_that_begins_stopped_and_ends_so_says_it_once(run: RunResult) -> None:

@@ -16,6 +16,8 @@ RECOVERY = "test_supervisor.py::test_recovers_only_when_every_two_sigma_is_below
 PROTECTION = TESTS + "test_protection_mode.py::"
 TEXTBOOK = PROTECTION + "test_the_level_is_that_of_textbook_filters_and_the_mode_follows_it"
 
+CONTRADICTS = TESTS + "test_trail.py::test_a_pose_contradicts_the_reflectors_that_what_it_sees_of_them_lies_beside"
+
 SEVERAL = TESTS + "test_several_scans.py::"
 
 LOCALIZATION = (
@@ -63,6 +65,37 @@ LOCALIZATION = (
         find="evidence += min(gains[entry], bound)",
         replace="evidence += gains[entry]",
         tests=(TESTS + "test_trail.py::test_a_pose_is_led_along_as_a_plain_filter_with_matrices_leads_it",),
+    ),
+    Mutant(
+        name="what is seen of a reflector on average is as noisy as a single detection",
+        file=FOLDER + "contradiction.py",
+        find="met[:, k] / weight**2",
+        replace="met[:, k] / weight",
+        tests=(CONTRADICTS,),
+    ),
+    Mutant(
+        name="a pose contradicts reflectors that stand where it says within what the supervisor allows",
+        file=FOLDER + "contradiction.py",
+        find=" & (np.hypot(x, y) > around.harmless)",
+        replace="",
+        tests=(CONTRADICTS,),
+    ),
+    Mutant(
+        name="a hypothesis is believed that contradicts every reflector",
+        file=FOLDER + "trail_search.py",
+        find="MOST_CONTRADICTED = 1.0 / 3.0",
+        replace="MOST_CONTRADICTED = 1.0",
+        tests=(
+            "tests/cli/test_localize_found.py"
+            "::test_a_moved_reflector_pulls_nobody_beside_the_place_that_the_others_tell",
+        ),
+    ),
+    Mutant(
+        name="things that scatter more than stated tell a pose as surely",
+        file=FOLDER + "hypothesis_fit.py",
+        find="misfit += d2",
+        replace="misfit += 0.0",
+        tests=(TESTS + "test_start.py::test_things_that_scatter_more_than_stated_tell_a_pose_less_surely",),
     ),
     Mutant(
         name="a beam that goes through a wall counts as one that ends at it",
