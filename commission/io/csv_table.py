@@ -232,7 +232,8 @@ def is_row(line: str) -> bool:
 
 def stated_delimiter(line: str) -> str | None:
     """What separates cells, by Excel's own first line `sep=;`; none for any other line."""
-    match = _STATED_DELIMITER.fullmatch(line.strip().strip('"'))
+    # A tab is stated as itself: it must not be stripped off.
+    match = _STATED_DELIMITER.fullmatch(line.strip(" \r\n").strip('"'))
     return match[1] if match else None
 
 
@@ -283,7 +284,9 @@ def _is_plain(lines: list[str], width: int, delimiter: str) -> bool:
     """Whether every line is a row without quotes, as nearly always: they are then split all at once."""
     joined = "".join(lines)
     has_width = {line.count(delimiter) for line in lines} == {width - 1}
-    return has_width and '"' not in joined and "#" not in joined and max(map(len, lines)) <= LINE_LIMIT
+    # A row of empty cells, as Excel leaves them, is passed over; one column alone has none.
+    is_full = width == 1 or delimiter * (width - 1) not in lines
+    return has_width and is_full and '"' not in joined and "#" not in joined and max(map(len, lines)) <= LINE_LIMIT
 
 
 def _cells(path: Path, number: int, line: str, delimiter: str) -> list[str]:

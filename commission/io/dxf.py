@@ -38,6 +38,8 @@ DEPTH_LIMIT = 32
 """Blocks within blocks."""
 
 _INSERTS_PER_REPORT = 1000
+_TOLD = 3
+"""Reasons that are told where there is nothing to draw."""
 _DRAWN = {b"LINE", b"LWPOLYLINE", b"POLYLINE", b"ARC", b"CIRCLE", b"ELLIPSE", b"SPLINE", b"INSERT"} | {
     b"MLINE",
     b"SOLID",
@@ -102,7 +104,11 @@ class Drawing:
         layers : names; all visible ones when None.
         progress : told how far it is; may raise to cancel.
         """
-        return outline_map(self.on(layers), resolution, self.path, progress)
+        segments = self.on(layers)
+        if not len(segments):
+            why = f" ({'; '.join(self.warnings[:_TOLD])})" if self.warnings else ""
+            raise FileFormatError(self.path, "", f"holds no lines to draw{why}", "at least one on the chosen layers")
+        return outline_map(segments, resolution, self.path, progress)
 
 
 def read_drawing(path: Path, *, unit: str | None = None, progress: Progress = silent) -> Drawing:
@@ -141,6 +147,8 @@ class _Block:
 
     base: tuple[float, float]
     content: list[tuple[str, Shape | Insert]]
+    file: str
+    """Drawing in which the content is, of an external reference; else empty."""
 
 
 class _Reader:
@@ -256,7 +264,12 @@ class _Reader:
             base = (group.number(10), group.number(20))
         except ValueError:
             base = (0.0, 0.0)
-        self._block = _Block(base, [])
+        try:
+            # 4: an external reference, 8: one that lies over the drawing; its content is in another file.
+            file = group.name(1) or "unnamed" if group.whole(70) & (4 | 8) else ""
+        except ValueError:
+            file = ""
+        self._block = _Block(base, [], file)
         self._blocks[group.name(2).upper()] = self._block
 
     def _take_entity(self, group: DxfGroup) -> None:
@@ -313,6 +326,10 @@ class _Reader:
             problem = "does not exist" if block is None else f"is nested over {DEPTH_LIMIT} deep, or in itself"
             self._found.add(f"block {shown(insert.block)}", problem)
             return
+        if block.file and not block.content:
+            remedy = "bind it in the CAD program (XREF, Bind), and save the drawing again"
+            problem = f"is in another file, {shown(block.file)}, which is not read: {remedy}"
+            self._found.add(f"block {shown(insert.block)}", problem)
         is_frozen = layer.upper() in self._frozen
         for index in range(insert.rows * insert.columns):
             self._inserts += 1

@@ -22,6 +22,7 @@ SIZE_LIMIT = 512_000_000
 BINARY_LIMIT = 64_000_000
 """Bytes of a binary drawing, which is held in memory as a whole."""
 _BINARY = b"AutoCAD Binary DXF"
+_DWG = b"AC10"
 _LINE_LIMIT = 65_536
 _TAG_LIMIT = 2_000_000
 """Pairs in one group: a polyline of about 700,000 points."""
@@ -114,6 +115,9 @@ def read_groups(path: Path, progress: Progress) -> Iterator[DxfGroup]:
         with path.open("rb") as file:
             head = file.read(len(_BINARY))
             file.seek(0)
+            if head.startswith(_DWG):
+                found = "is a DWG drawing, whatever its name says"
+                raise FileFormatError(path, "", found, "the drawing saved as DXF (in the CAD program: Save as, DXF)")
             tags = _binary_tags(path) if head == _BINARY else _text_tags(path, file, progress)
             yield from _groups(path, tags)
     except OSError as error:

@@ -218,6 +218,9 @@ def _classify(image: Image.Image, description: MapDescription, found: Findings) 
     opaque: NDArray[np.bool_] | None = None
     if image.mode in ("P", "1", "PA") or "transparency" in image.info:
         image = image.convert("RGBA" if "transparency" in image.info or image.mode == "PA" else "RGB")
+        if image.mode == "RGB" and all(band.tobytes() == image.getchannel(0).tobytes() for band in image.split()[1:]):
+            # A palette of grays: that it has one is how the file was saved, not what it shows.
+            image = image.getchannel(0)
     if image.mode == "F":
         raise ValueError("gray values are floating-point numbers")
     pixels = np.asarray(image)
@@ -232,7 +235,7 @@ def _classify(image: Image.Image, description: MapDescription, found: Findings) 
         gray = pixels[rows] if pixels.ndim == 2 else pixels[rows].mean(axis=2)
         cells[rows] = _cells_of(gray.astype(np.float64) / full_scale, description)
         if saved:
-            cells[rows][gray == _GRAY[UNKNOWN]] = UNKNOWN
+            cells[rows][gray == _GRAY[UNKNOWN] * (full_scale / 255.0)] = UNKNOWN
         if opaque is not None and description.mode is MapMode.SCALE:
             cells[rows][~opaque[rows]] = UNKNOWN
     if saved and (count := int(np.count_nonzero(cells == UNKNOWN))):
@@ -248,10 +251,12 @@ def _is_saved_by_map_saver(pixels: NDArray[Any], description: MapDescription) ->
     """
     unknown = 1.0 - _GRAY[UNKNOWN] / 255.0
     hidden = not description.negate and description.free_thresh > unknown and description.mode is MapMode.TRINARY
-    if not hidden or pixels.ndim != 2 or pixels.dtype != np.uint8:
+    if not hidden or pixels.ndim != 2:
         return False
-    grays = np.flatnonzero(np.bincount(pixels.reshape(-1), minlength=256))
-    return set(grays.tolist()) <= {*_GRAY.values(), 255}
+    # An image of 16 bits that was made of one of 8 has each gray 257 times.
+    once = 1 if pixels.dtype == np.uint8 else 257
+    grays = np.flatnonzero(np.bincount(np.clip(pixels, 0, 65535).reshape(-1)))
+    return set(grays.tolist()) <= {once * gray for gray in (*_GRAY.values(), 255)}
 
 
 def _cells_of(brightness: NDArray[np.float64], description: MapDescription) -> NDArray[np.int8]:

@@ -45,7 +45,8 @@ def decoded(path: Path, line: int, data: bytes, found: Findings | None = None) -
     ----------
     path, line : the file, and the line (from 1) on which the bytes begin, for the message.
     data : UTF-8.
-    found : takes a note; with it, what is not UTF-8 is taken for Windows-1252, in which Excel saves text.
+    found : takes a note; with it, what is not UTF-8 is taken for Windows-1252, in which Excel saves text, or for UTF-16
+        where it begins so, in which Excel saves "Unicode text".
 
     Raises
     ------
@@ -55,6 +56,9 @@ def decoded(path: Path, line: int, data: bytes, found: Findings | None = None) -
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError as error:
+        if found is not None and data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+            with suppress(UnicodeDecodeError):
+                return data.decode("utf-16")
         if found is not None and b"\0" not in data:
             with suppress(UnicodeDecodeError):
                 text = data.decode("cp1252")

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from commission.geometry.angles import wrap
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.detector import threshold_at
 from commission.progress import Progress, silent
@@ -23,6 +22,7 @@ from commission.site.record_store import ScanStore
 from commission.site.scanner import Scanner
 from commission.studies.inputs import StudyInput
 from commission.studies.recording_overview import beams_in_words
+from commission.studies.reference_headings import are_degrees
 
 FASTEST = 15.0
 """Speed beyond which no vehicle of this kind drives [m/s]."""
@@ -375,6 +375,12 @@ def _scans_of(inputs: PlausibilityInput, scans: ScanStore, scanner: Scanner | No
     ranges = np.asarray(some.ranges, dtype=np.float64)
     returned = np.isfinite(ranges)
     yield from _ranges(called, ranges[returned], scanner)
+    if not returned.any():
+        yield Finding(
+            found=f"no beam of the {called} has a range",
+            probably="its window is covered, or what was recorded in place of ranges is none (0, inf, all too far)",
+            remedy="look at the scanner's own display, and at the limits (range_max) and the unit of what was recorded",
+        )
     if some.intensities is not None and some.reflector is None and returned.any():
         strengths = np.asarray(some.intensities, dtype=np.float64)[returned]
         yield from _intensities(called, strengths, ranges[returned], inputs.detector)
@@ -425,24 +431,11 @@ def _intensities(name: str, values: FloatArray, ranges: FloatArray, detector: De
 
 
 def _reference(inputs: PlausibilityInput) -> Iterator[Finding]:
-    """Find headings in degrees by the way from pose to pose: one in radians that was never wrapped is large, too."""
+    """Find headings in degrees."""
     poses = inputs.log.reference_poses
-    known = poses[np.isfinite(poses).all(axis=1)]
-    if len(known) < 2 or np.abs(known[:, 2]).max() <= math.pi + 0.1:
-        return
-    steps = np.diff(known[:, :2], axis=0)
-    length = np.hypot(steps[:, 0], steps[:, 1])
-    moving = length > max(0.25 * float(np.quantile(length, 0.9)), 1e-4)
-    if not moving.any():
-        return
-    course = np.arctan2(steps[moving, 1], steps[moving, 0])
-    as_radians, as_degrees = (
-        float(np.median(np.abs(wrap(2.0 * (course - theta)))))  # twice the angle: forward and reverse are alike
-        for theta in (known[:-1, 2][moving], np.radians(known[:-1, 2][moving]))
-    )
-    if as_degrees < 0.3 < as_radians:
+    if are_degrees(poses):
         yield Finding(
-            found=f"headings of the reference reach {np.abs(known[:, 2]).max():.1f} rad, not the way it drives",
+            found=f"headings of the reference reach {np.nanmax(np.abs(poses[:, 2])):.1f} rad, not the way it drives",
             probably="they are in degrees",
-            remedy="expected theta in radians",
+            remedy="expected theta in radians; start and errors take them for degrees",
         )

@@ -41,6 +41,7 @@ from commission.studies.metrics import (
     reference_at,
     without_reference,
 )
+from commission.studies.reference_headings import in_radians
 from commission.studies.scanner_figures import ScannerFigures, scanner_figures
 from commission.studies.scanner_figures import warm_up as scanner_figures_warm_up
 from commission.studies.start import Start
@@ -326,7 +327,7 @@ def references_of(log: RecordLog, columns: RunColumns) -> FloatArray:
     to the estimate is then that of the antenna's places.
     """
     mount = log.reference_mount
-    found = reference_at(columns.stamps_ns, log.reference_times_ns, log.reference_poses)
+    found = reference_at(columns.stamps_ns, log.reference_times_ns, in_radians(log.reference_poses))
     return mount.at_base(found, columns.means[:, 2])
 
 

@@ -20,6 +20,7 @@ from commission.localization.state import FilterState, state_at_start, state_unl
 from commission.site.project import Project
 from commission.site.record_log import RecordLog
 from commission.site.routes import Direction, Route
+from commission.studies.reference_headings import in_radians
 
 DEFAULT_SIGMAS = (0.02, 0.02, 0.01)
 """1-sigma of a start pose that comes without one: x [m], y [m], theta [rad]: well inside the alarm limits."""
@@ -118,7 +119,7 @@ def start_of(
     )
     if len(known) > 0:
         return Start(
-            belief_at(first_ns, log.reference_mount.at_base(log.reference_poses[known[:1]])[0], sigmas),
+            belief_at(first_ns, log.reference_mount.at_base(in_radians(log.reference_poses)[known[:1]])[0], sigmas),
             StartOrigin.REFERENCE,
         )
     if project.routes:

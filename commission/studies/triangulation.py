@@ -23,6 +23,7 @@ from commission.site.record_log import RecordLog
 from commission.site.reflectors import ReflectorMap
 from commission.studies.inputs import StudyInput
 from commission.studies.metrics import reference_at
+from commission.studies.reference_headings import in_radians
 from commission.studies.start import Start
 
 NOBODY = -1
@@ -180,7 +181,7 @@ def summary(inputs: TriangulationInput, result: TriangulationResult) -> dict[str
         "nis_mean": float(np.nanmean(result.nis)) if np.isfinite(result.nis).any() else None,
     }
     log = inputs.log
-    truth = reference_at(result.stamps_ns, log.reference_times_ns, log.reference_poses)
+    truth = reference_at(result.stamps_ns, log.reference_times_ns, in_radians(log.reference_poses))
     for name, poses in (("fix", result.fixes), ("filter", result.filtered)):
         known = np.isfinite(truth[:, 0]) & (fixed if name == "fix" else True)
         if known.any():

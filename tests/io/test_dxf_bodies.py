@@ -206,3 +206,20 @@ def test_drawing_that_ends_among_its_entities_is_refused(tmp_path: Path) -> None
     path.write_bytes(whole[: whole.rindex(b"LINE")])
     with pytest.raises(FileFormatError, match="ends before its entities do"):
         read_drawing(path)
+
+
+def test_what_is_in_another_file_is_told_and_said_where_nothing_else_is_drawn(tmp_path: Path) -> None:
+    def draw(space: Modelspace) -> None:
+        space.doc.add_xref_def("hall.dwg", "HALL")
+        space.add_blockref("HALL", (0, 0))
+
+    found = read(tmp_path, draw)
+    assert "block 'HALL': is in another file, 'hall.dwg', which is not read: bind it" in found.warnings[0]
+    with pytest.raises(FileFormatError, match=r"holds no lines to draw .*'hall\.dwg'"):
+        found.floor_map(0.05)
+
+
+def test_a_dwg_that_is_called_dxf_is_named_as_such(tmp_path: Path) -> None:
+    (tmp_path / "plan.dxf").write_bytes(b"AC1032" + bytes(200))
+    with pytest.raises(FileFormatError, match="is a DWG drawing"):
+        read_drawing(tmp_path / "plan.dxf")

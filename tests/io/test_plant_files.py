@@ -47,9 +47,12 @@ TWO = [("R1", 1.5, 2.25), ("R2", 3.0, 4.0)]
         '"sep=;"\r\nid;x;y;radius\r\nR1;1,5;2,25;0,04\r\nR2;3;4;0,04\r\n',
         "Name;x;y;;\nR1;1,5;2,25;;\n;;;;\nR2;3;4;;\n",
         "R1;1,5;2,25;;\nR2;3;4;;\n",
+        "id;x;y;radius\nR1;1,5;2,25;0,04\n;;;\nR2;3;4;0,04\n",
+        "sep=\t\nid\tx\ty\tradius\nR1\t1,5\t2,25\t0,04\nR2\t3\t4\t0,04\n",
+        "id\tx\ty\tradius\nR1\t1,5\t2,25\t0,04\nR2\t3\t4\t0,04\n".encode("utf-16"),
     ],
 )
-def test_what_excel_adds_is_passed_over(tmp_path: Path, content: str) -> None:
+def test_what_excel_adds_is_passed_over(tmp_path: Path, content: str | bytes) -> None:
     assert places(table(tmp_path, content)) == TWO
 
 
@@ -166,6 +169,15 @@ def test_unknown_cells_that_map_saver_wrote_stay_unknown_whatever_the_threshold(
     found = Findings()
     assert counts(read_floor_map(floor_map(tmp_path, free=free), found=found).cells) == [8, 2, 2]
     assert len(found.lines()) == notes
+
+
+@pytest.mark.parametrize("kind", ["16 bits", "palette"])
+def test_unknown_cells_stay_unknown_however_the_grays_are_stored(tmp_path: Path, kind: str) -> None:
+    path = floor_map(tmp_path, "hall.png", free=0.25)
+    image = Image.fromarray(GRAYS)
+    image = Image.fromarray(GRAYS.astype(np.uint16) * 257) if kind == "16 bits" else image.convert("P")
+    image.save(tmp_path / "hall.png")
+    assert counts(read_floor_map(path).cells) == [8, 2, 2]
 
 
 def test_grays_of_a_drawn_map_are_judged_by_its_thresholds_alone(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ import pytest
 from commission.errors import JobCancelled
 from commission.site.record_log import RecordLog
 from commission.studies.plausibility import Finding, PlausibilityInput, plausibility
+from commission.studies.start import start_of
 from tests.studies.recorded import PROJECT, SECOND, drive, pose_at, scan_log
 
 
@@ -144,6 +145,18 @@ def test_reference_in_degrees_is_told_and_one_that_was_never_wrapped_is_not() ->
     assert judged(log) == ()
     degrees = log.reference_poses * (1.0, 1.0, 180.0 / math.pi)
     assert "in degrees" in only(dataclasses.replace(log, reference_poses=degrees)).probably
+    # What starts there does not begin where nobody is.
+    started = [
+        start_of(PROJECT, dataclasses.replace(log, reference_poses=p)).belief.mean
+        for p in (degrees, log.reference_poses)
+    ]
+    np.testing.assert_allclose(*started, atol=1e-9)
+
+
+def test_scans_of_which_no_beam_has_a_range_are_told() -> None:
+    log = with_scans(intensities=MIXED)
+    nothing = dataclasses.replace(log.scans[0].block(0, 200), ranges=np.full((200, 720), np.inf, np.float32))
+    assert "no beam of the scans has a range" in only(dataclasses.replace(log, scans=(nothing,))).found
 
 
 def test_recording_in_which_nothing_is_seen_and_nothing_moves_is_told() -> None:

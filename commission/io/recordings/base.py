@@ -104,7 +104,32 @@ def open_recording(path: Path, options: ChannelOptions = NO_OPTIONS) -> Recordin
                 return reader(path, options)
     except (OSError, ValueError) as error:
         raise cannot_read(path, error) from error
+    packed = _packing(path)
+    if packed:
+        remedy = f"what is in it, unpacked ({packed[1]}), or of a ROS 2 bag its folder with metadata.yaml"
+        raise FileFormatError(path, "", f"is packed as a whole ({packed[0]})", remedy)
     raise FileFormatError(path, "", "is no recording", READ)
+
+
+_PACKINGS = {
+    b"\x28\xb5\x2f\xfd": ("zstd", "zstd -d"),
+    b"\x1f\x8b": ("gzip", "gunzip, of a .tar.gz: tar xf"),
+    b"BZh": ("bzip2", "bunzip2"),
+    b"\xfd7zXZ\0": ("xz", "unxz"),
+    b"\x04\x22\x4d\x18": ("lz4", "lz4 -d"),
+    b"PK\x03\x04": ("zip", "unzip"),
+    b"7z\xbc\xaf\x27\x1c": ("7z", "7z x"),
+}
+"""How packed files begin; what the packing is called, and what unpacks it."""
+
+
+def _packing(path: Path) -> tuple[str, str] | None:
+    """How a file is packed, and what unpacks it; None where it is not."""
+    if not path.is_file():
+        return None
+    with path.open("rb") as file:
+        begin = file.read(8)
+    return next((told for magic, told in _PACKINGS.items() if begin.startswith(magic)), None)
 
 
 def load_log(path: Path, options: ChannelOptions = NO_OPTIONS) -> RecordLog:

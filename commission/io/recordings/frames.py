@@ -14,6 +14,9 @@ BASES = ("base_link", "base_footprint", "base", "base_frame")
 """Frames of a vehicle, the preferred one first (REP 105)."""
 _DEEPEST = 32
 _MOVED = 1e-6
+_LEVEL = 1e-9
+_TILT = 5.0
+"""Angle of the plane of a scanner with the floor from which it is told [deg]."""
 
 
 class Frames:
@@ -54,7 +57,14 @@ class Frames:
 
 def _in_words(base: str, T_base_scanner: FloatArray) -> str:
     """Place [m] and heading [rad] of a scanner in the frame of its vehicle."""
-    x, y = T_base_scanner[:2, 3]
+    # Adding 0 makes -0 a 0; what is left of a turn by rounding is none, either.
+    x, y = np.round(T_base_scanner[:2, 3], 9) + 0.0
     heading = math.atan2(T_base_scanner[1, 0], T_base_scanner[0, 0])
-    down = ", upside down" if T_base_scanner[2, 2] < 0.0 else ""
-    return f"[{x:.4g}, {y:.4g}, {heading:.4g}]{down} (x [m], y [m], heading [rad] in {base})"
+    up = float(T_base_scanner[2, 2])
+    down = ", upside down" if up < -_LEVEL else ""
+    # What measures in a plane that leans sees no hall; a camera's optical frame stands upright.
+    tilt = math.degrees(math.acos(min(1.0, abs(up))))
+    leaning = (
+        f", its plane leaning by {tilt:.3g} deg: expected is the frame in which it measures" if tilt > _TILT else ""
+    )
+    return f"[{x:.4g}, {y:.4g}, {heading:.4g}]{down}{leaning} (x [m], y [m], heading [rad] in {base})"

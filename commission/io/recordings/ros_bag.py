@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from commission.errors import FileFormatError
 from commission.io.recordings import ros_messages as ros
@@ -111,6 +114,9 @@ class _Reading:
         self.options = options
         self.frames = Frames()
         self._unstamped: Counter[str] = Counter()
+        self._all_beyond: Counter[str] = Counter()
+        self._beyond: dict[str, tuple[float, float]] = {}
+        """Farthest range by its own word, and typical range [m] of the first scan of a topic that is all beyond it."""
         self._scanner_of = {topic: scanners.index(name) for topic, name in chosen.scanners.items()}
         self._frame_of: dict[str, str] = {}
         """Frame of each scanner, by its name."""
@@ -142,17 +148,31 @@ class _Reading:
         scanner = self._scanner_of[message.topic]
         scan = ros.scan_of(message.value, kind, stamp, scanner)
         if scan is None:
-            self.collector.told[f"messages of {message.topic} without beams are left out"] += 1
+            why = "without beams, or without an angle_min and angle_increment from beam to beam,"
+            self.collector.told[f"messages of {message.topic} {why} are left out"] += 1
             return
+        if not np.isfinite(scan.ranges).any() and math.isfinite(typical := ros.typical_range(message.value, kind)):
+            farthest = float(message.value.range_max)
+            self._beyond.setdefault(message.topic, (farthest, typical))
+            self._all_beyond[message.topic] += 1
         self._frame_of[self.collector.scanners[scanner]] = _frame(message.value.header)
         if scan.intensities is None:
-            self.collector.told[f"scans of {message.topic} have no intensities: no reflector can be seen in them"] += 1
+            some = 0 < len(message.value.intensities) != len(message.value.ranges)
+            what = f"{len(message.value.intensities)} intensities of {len(message.value.ranges)} beams" if some else ""
+            what = what or "no intensities"
+            self.collector.told[f"scans of {message.topic} have {what}: no reflector can be seen in them"] += 1
         self.collector.add_scan(scan)
 
     def notes(self) -> Iterator[str]:
         """What is to be told after the last message."""
         for topic, count in self._unstamped.items():
             yield f"{count} messages of {topic} have no stamp; the time of recording stands for it"
+        for topic, (farthest, typical) in self._beyond.items():
+            yield (
+                f"in {self._all_beyond[topic]} scans of {topic} every range is outside of the limits that they state "
+                f"themselves (range_max {farthest:g} m, typical range {typical:.4g}): nothing is left of them; "
+                "are they in millimetres, or is range_max wrong?"
+            )
         for scanner, frame in self._frame_of.items():
             mounted = self.frames.mounting(frame, self._base)
             if mounted:

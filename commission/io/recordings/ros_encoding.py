@@ -61,7 +61,8 @@ def definition_of(kind: str) -> str:
 def laser_scan(scan: Scan, frame: str) -> bytes:
     """Return a scan as a LaserScan in the frame of its scanner."""
     known = scan.ranges[np.isfinite(scan.ranges)]
-    farthest = float(known.max()) if len(known) else 0.0
+    # More than the farthest one, which readers take for no return.
+    farthest = 1.001 * float(known.max()) if len(known) else 0.0
     last = scan.angle_min + scan.angle_increment * (len(scan.ranges) - 1)
     angles = scan.angle_min, last, scan.angle_increment
     strengths = np.empty(0, np.float32) if scan.intensities is None else scan.intensities

@@ -91,11 +91,12 @@ def scan_of(message: Any, kind: str, stamp_ns: int, scanner: int) -> Scan | None
     if not len(ranges):
         return None
     nearest, farthest = float(message.range_min), float(message.range_max)
-    # REP 117: what is not within the limits is no measurement; a driver that states no limits has 0.
+    # REP 117: what is not within the limits is no measurement; a driver that states no limits has 0. The farthest range
+    # itself, to the last bit, is what simulators and some drivers say where nothing came back.
     with np.errstate(invalid="ignore"):
         outside = ~np.isfinite(ranges) | (ranges <= 0.0) | (ranges < np.float32(nearest))
         if farthest > nearest:
-            outside |= ranges > np.float32(farthest)
+            outside |= ranges >= np.float32(farthest)
     ranges[outside] = np.nan
     intensities = np.array(strengths, dtype=np.float32) if len(strengths) == len(ranges) else None
     if intensities is not None and not np.isfinite(intensities).any():
@@ -111,6 +112,18 @@ def scan_of(message: Any, kind: str, stamp_ns: int, scanner: int) -> Scan | None
         intensities=intensities,
         scanner=scanner,
     )
+
+
+def typical_range(message: Any, kind: str) -> float:
+    """Median of the ranges as they are sent, whatever the limits [m]; NaN where there is none.
+
+    Parameters
+    ----------
+    message, kind : decoded, and the name of its type.
+    """
+    ranges = np.asarray(_echoes(message)[0] if kind == SCAN_TYPES[1] else message.ranges, dtype=np.float64)
+    ranges = ranges[np.isfinite(ranges) & (ranges > 0.0)]
+    return float(np.median(ranges)) if len(ranges) else math.nan
 
 
 def _echoes(message: Any) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from commission.errors import FileFormatError, reason_of
 from commission.io.reading import cannot_read
-from commission.io.recordings.mcap_reader import MAGIC, McapChannel, McapFile
+from commission.io.recordings.mcap_reader import MAGIC, RECORD_LIMIT, McapChannel, McapFile
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 ROS1_MAGIC = b"#ROSBAG V2.0"
 SQLITE_MAGIC = b"SQLite format 3\0"
 METADATA = "metadata.yaml"
+ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,6 +135,7 @@ class McapSource:
                 self._notes.append(f"{file.name} was cut while it was recorded; it is read up to there")
 
     def _decoded(self, channel: McapChannel, data: bytes) -> Any:
+        data = unpacked_message(data)
         store = self._typestore(channel)
         kind = ros2_type(channel.schema)
         return store.deserialize_ros1(data, kind) if channel.encoding == "ros1" else store.deserialize_cdr(data, kind)
@@ -169,6 +171,7 @@ class RosbagsSource:
         """Read what the bag says about its topics."""
         self.path = path
         self.notes: tuple[str, ...] = ()
+        self._is_ros1 = path.is_file() and _begins_with(path, ROS1_MAGIC)
         with _told(path), self._reader() as reader:
             found: dict[str, tuple[str, int]] = {}
             for connection in reader.connections:
@@ -183,15 +186,19 @@ class RosbagsSource:
             if not chosen:
                 return
             for connection, stamp, data in reader.messages(connections=chosen):
-                yield BagMessage(connection.topic, stamp, reader.deserialize(data, connection.msgtype))
+                plain = data if self._is_ros1 else unpacked_message(data)
+                yield BagMessage(connection.topic, stamp, reader.deserialize(plain, connection.msgtype))
 
     def _reader(self) -> Any:
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
 
-        is_ros1 = self.path.is_file() and _begins_with(self.path, ROS1_MAGIC)
-        store = get_typestore(Stores.ROS1_NOETIC if is_ros1 else Stores.ROS2_HUMBLE)
-        return AnyReader([_with_suffix(self.path, is_ros1)], default_typestore=store)
+        store = get_typestore(Stores.ROS1_NOETIC if self._is_ros1 else Stores.ROS2_HUMBLE)
+        paths = [_with_suffix(self.path, self._is_ros1)]
+        if self.path.is_dir() and not (self.path / METADATA).is_file():
+            # A recorder writes it when it ends; where it was stopped, the files stand alone.
+            paths = _files(self.path, ".db3")
+        return AnyReader(paths, default_typestore=store)
 
 
 def _with_suffix(path: Path, is_ros1: bool) -> Path:
@@ -207,6 +214,22 @@ def _with_suffix(path: Path, is_ros1: bool) -> Path:
 def _begins_with(path: Path, magic: bytes) -> bool:
     with path.open("rb") as file:
         return file.read(len(magic)) == magic
+
+
+def unpacked_message(data: bytes) -> bytes:
+    """Return a message of a bag whose messages are packed one by one (`compression_mode: MESSAGE`), or it as it is.
+
+    Encoded messages begin with a byte of 0: what begins as zstd does is none. Raises ValueError where it is damaged.
+    """
+    if not data.startswith(ZSTD_MAGIC):
+        return data
+    from rosbags.rosbag2.storage_mcap import zstd
+
+    try:
+        # A few bytes could unpack into gigabytes.
+        return zstd.ZstdDecompressor().decompress(data, max_length=RECORD_LIMIT)
+    except zstd.ZstdError as error:
+        raise ValueError(str(error)) from error
 
 
 def ros2_type(name: str) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from rosbags.rosbag1 import Writer as Writer1
-from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -25,8 +25,9 @@ Message = tuple[str, str, int, Callable[[Any], Any]]
 """Topic, type, stamp of the recording [ns], and what makes the message from a typestore."""
 
 
-def write_bag(path: Path, messages: Iterable[Message]) -> Path:
-    """Write a bag of the kind that the path's ending says; returns where it is."""
+def write_bag(path: Path, messages: Iterable[Message], *, packed: str = "") -> Path:
+    """Write a bag of the kind that the path's ending says, packed by FILE or MESSAGE; returns where it is."""
+    path.parent.mkdir(exist_ok=True)
     is_ros1 = path.suffix == ".bag"
     store = ROS1 if is_ros1 else ROS2
     if is_ros1:
@@ -35,6 +36,8 @@ def write_bag(path: Path, messages: Iterable[Message]) -> Path:
         path = path.with_suffix("")
         kind = StoragePlugin.MCAP if path.name.endswith("mcap") else StoragePlugin.SQLITE3
         writer = Writer2(path, version=9, storage_plugin=kind)
+        if packed:
+            writer.set_compression(CompressionMode[packed], CompressionFormat.ZSTD)
     with writer:
         connections: dict[str, Any] = {}
         for topic, kind, stamp, make in messages:
@@ -183,13 +186,18 @@ def transform(
     pose: tuple[float, float, float],
     *,
     upside_down: bool = False,
+    pitch: float | None = None,
     topic: str = "/tf_static",
 ) -> Message:
     def make(store: Any) -> Any:
         types = store.types
+        turned = quaternion(store, pose[2], upside_down=upside_down)
+        if pitch is not None:
+            half = 0.5 * pitch
+            turned = types["geometry_msgs/msg/Quaternion"](x=0.0, y=math.sin(half), z=0.0, w=math.cos(half))
         moved = types["geometry_msgs/msg/Transform"](
             translation=types["geometry_msgs/msg/Vector3"](x=pose[0], y=pose[1], z=0.2),
-            rotation=quaternion(store, pose[2], upside_down=upside_down),
+            rotation=turned,
         )
         stamped = types["geometry_msgs/msg/TransformStamped"](
             header=header(store, stamp, parent), child_frame_id=child, transform=moved

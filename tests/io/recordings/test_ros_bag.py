@@ -348,3 +348,37 @@ def test_intensities_that_are_all_nan_are_none(tmp_path: Path) -> None:
 
     assert log.scans[0].scan(0).intensities is None
     assert "1 scans of /scan have no intensities: no reflector can be seen in them" in log.notes
+
+
+@pytest.mark.parametrize("kind", [".mcap", ".db3"])
+@pytest.mark.parametrize("name", ["MESSAGE", "FILE"])
+def test_packed_bag_of_ros_2_is_read_as_if_it_were_not(tmp_path: Path, kind: str, name: str) -> None:
+    path = bags.write_bag(tmp_path / f"bag_{kind[1:]}{kind}", drive(), packed=name)
+    assert len(load_log(path).scans[0]) == 4
+    alone = next(file for file in path.iterdir() if file.suffix != ".yaml")
+    if name == "MESSAGE":
+        assert len(load_log(alone).scans[0]) == 4
+    else:
+        with pytest.raises(FileFormatError, match=r"is packed as a whole \(zstd\); expected what is in it, unpacked"):
+            load_log(alone)
+
+
+def test_files_of_a_recorder_that_was_stopped_before_it_wrote_metadata_are_read_in_turn(tmp_path: Path) -> None:
+    folder = tmp_path / "stopped"
+    folder.mkdir()
+    for part, messages in enumerate((drive()[:6], drive()[6:])):
+        file = next(written(tmp_path / str(part), ".db3", messages).glob("*.db3"))
+        file.rename(folder / f"drive_{part}.db3")
+    assert len(load_log(folder).scans[0]) == 4
+
+
+def test_farthest_range_itself_is_no_return_and_a_scan_that_is_all_beyond_it_is_told(tmp_path: Path) -> None:
+    log = read(tmp_path / "a", [bags.scan(START, [30.0, 2.0, 29.9])])
+    np.testing.assert_array_equal(log.scans[0].scan(0).ranges, np.array([np.nan, 2.0, 29.9], np.float32))
+    log = read(tmp_path / "b", [bags.scan(START, [3000.0, 2000.0, math.inf])])
+    assert any("range_max 30 m, typical range 2500): nothing is left of them" in note for note in log.notes)
+
+
+def test_a_frame_whose_plane_does_not_lie_level_is_told(tmp_path: Path) -> None:
+    leaning = bags.transform(START, "base_link", "laser", (1.0, 0.5, 0.0), pitch=math.pi / 2)
+    assert any("its plane leaning by 90 deg" in note for note in read(tmp_path, [leaning, *drive()]).notes)
