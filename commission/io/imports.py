@@ -15,7 +15,7 @@ from commission.errors import FileFormatError
 from commission.io.findings import Findings
 from commission.io.imk import ReflectorImport, read_imk
 from commission.io.json_document import read_json
-from commission.io.lif import read_lif
+from commission.io.lif import is_layout, read_lif
 from commission.io.pasted_table import parse_table
 from commission.io.project_archive import ProjectImport, read_project_archive
 from commission.io.reading import read_bytes
@@ -139,7 +139,7 @@ def _read(path: Path, choice: LayoutChoice, progress: Progress) -> Imported:
         return read_imk(path)
     if path.suffix == ".csv":
         return read_any_table(path)
-    if path.suffix == ".lif" or "layouts" in read_json(path, Findings()).values:
+    if path.suffix == ".lif" or is_layout(read_json(path, Findings())):
         return read_lif(path, vehicle_type=choice.vehicle_type, layout=choice.layout)
     return read_order(path)
 

@@ -18,7 +18,7 @@ from commission.io.dxf import read_drawing
 from commission.io.findings import Findings
 from commission.io.imk import read_imk, write_imk
 from commission.io.json_document import read_json
-from commission.io.lif import read_lif
+from commission.io.lif import is_layout, read_lif
 from commission.io.lif_writer import write_lif
 from commission.io.map_server import read_floor_map, write_floor_map
 from commission.io.overwriting import refuse_files
@@ -122,6 +122,11 @@ _UNREAD = {
     ".png": "the map.yaml that describes the image; the page also takes a plain image as a floor map",
     ".pgm": "the map.yaml that describes the image; the page also takes a plain image as a floor map",
     ".bmp": "the map.yaml that describes the image; the page also takes a plain image as a floor map",
+    **dict.fromkeys((".jpg", ".jpeg", ".tif", ".tiff", ".gif", ".webp"), "the image saved as PNG"),
+    **dict.fromkeys((".zip", ".7z", ".gz", ".bz2", ".xz", ".zst", ".zstd", ".tar", ".tgz", ".rar"), "it unpacked"),
+    **dict.fromkeys((".xlsm", ".xlsb", ".numbers"), "the table saved as CSV"),
+    **dict.fromkeys((".pbstream", ".posegraph"), "the map saved by map_saver as map.yaml with its image"),
+    **dict.fromkeys((".pcd", ".las", ".laz", ".e57", ".xyz", ".pts"), "a floor plan or model instead of a point cloud"),
 }
 """What to bring instead of a file that is not read."""
 
@@ -160,7 +165,7 @@ def kind_of_source(path: Path) -> Kind:
     if kind is None:
         remedy = _UNREAD.get(path.suffix.lower(), f"a folder, or a file that ends in {', '.join(_SUFFIXES)}")
         raise FileFormatError(path, "", f"ends in {path.suffix!r}, which is not read", remedy)
-    if path.suffix.lower() == ".json" and "layouts" not in read_json(path, Findings()).values:
+    if path.suffix.lower() == ".json" and not is_layout(read_json(path, Findings())):
         return Kind.ORDER
     return kind
 

@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from commission.errors import UsageError
 from commission.io.findings import Findings, shown
@@ -62,7 +63,7 @@ def read_lif(path: Path, *, vehicle_type: str | None = None, layout: str | None 
         the file has no such vehicle type or layout; names those that it has.
     """
     found = Findings()
-    root = read_json(path, found)
+    root = _as_published(read_json(path, found))
     root.require_list("layouts")
     _note_version(root, found)
     layouts = list(root.mappings("layouts", "layout", "layoutId"))
@@ -82,6 +83,49 @@ def read_lif(path: Path, *, vehicle_type: str | None = None, layout: str | None 
     return RouteImport(
         routes=routes, warnings=found.lines(), stations=stations, vehicle_types=tuple(counts), layouts=names
     )
+
+
+_RENAMED = {
+    "mobileRobotTypeNodeProperties": "vehicleTypeNodeProperties",
+    "mobileRobotTypeEdgeProperties": "vehicleTypeEdgeProperties",
+    "mobileRobotTypes": "vehicleTypeIds",
+    "mobileRobotOrientations": "vehicleOrientations",
+}
+"""What the drafts of LIF 2 of September 2025 and later call otherwise than version 1."""
+
+
+def _as_published(root: Fields) -> Fields:
+    """Return a draft of LIF 2, whose layouts lie in origins and whose vehicles are mobile robots, as version 1 has it.
+
+    Each origin has coordinates of its own, so that several are noted.
+    """
+    if "layouts" in root.values or "origins" not in root.values:
+        return root
+    layouts: list[Any] = []
+    origins = list(root.mappings("origins", "origin", "originId"))
+    for origin in origins:
+        for layout in origin.mappings("layouts", "layout", "layoutId"):
+            layouts.append({"stations": [], **_renamed(layout.values)})
+    if len(origins) > 1:
+        named = ", ".join(shown(origin.text("originId")) for origin in origins[:5])
+        root.found.add("", f"{len(origins)} origins ({named}) have coordinates of their own; choose a layout of one")
+    return replace(root, values={**root.values, "layouts": layouts})
+
+
+def _renamed(value: Any) -> Any:
+    """Return a value with keys, and types of vehicles, as version 1 has them."""
+    if isinstance(value, list):
+        return [_renamed(each) for each in value]
+    if not isinstance(value, dict):
+        return value
+    if set(value) == {"manufacturer", "seriesName"}:
+        return f"{value['manufacturer']} {value['seriesName']}"
+    return {_RENAMED.get(str(key).strip(), key): _renamed(each) for key, each in value.items()}
+
+
+def is_layout(root: Fields) -> bool:
+    """Whether a document is a LIF layout, of version 1 or a draft of version 2."""
+    return "layouts" in root.values or "origins" in root.values
 
 
 def _note_version(root: Fields, found: Findings) -> None:

@@ -89,6 +89,10 @@ def read_smap(path: Path) -> SmapImport:
         count = len(bright) if isinstance(bright, list) else 1
         found.add("", f"rssiPosList holds {count} bright points of scans; they are no reflectors and are not read")
     _note_areas(root, reflectors)
+    lines = Counter(line.text("className") or "line" for line in root.mappings("advancedLineList"))
+    if lines:
+        listed = ", ".join(f"{count} {kind}" for kind, count in lines.items())
+        found.add("", f"drawn lines are no walls and are not read ({listed})")
     return SmapImport(
         walls=walls,
         reflectors=reflectors,

@@ -19,17 +19,19 @@ from commission.localization import whole_run
 from commission.localization.detection_log import DetectionLog
 from commission.localization.estimate import Belief, Status
 from commission.localization.run_columns import RunColumns
-from commission.localization.setup import LocalizerSetup
+from commission.localization.setup import FEWEST_TO_FIND, LocalizerSetup
 from commission.localization.state import FilterState
 from commission.progress import Progress, silent
 from commission.site.disturbances import WheelNoise
 from commission.site.quantity import DEGREES, MILLIMETRES, MILLISECONDS, PERCENT
 from commission.site.record_log import RecordLog
+from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
 from commission.studies.consistency_findings import lost_findings
 from commission.studies.inputs import StudyInput
 from commission.studies.plausibility import Finding
 from commission.studies.scanner_figures import scanner_figures
+from commission.studies.start import unknown_start_at
 
 JUDGED_CYCLES = 6000
 """Scans from the start of the drive that are localized under each suspicion: four minutes at 25 per second."""
@@ -117,6 +119,9 @@ def misfit(inputs: MisfitInput, progress: Progress = silent) -> tuple[Finding, .
     before = _fit(inputs, detected)
     progress(0.1, "mounting")
     mounting = tuple(_mounting(inputs, detected, before)) if before.worst < POOR_SHARE else ()
+    if not mounting and before.worst < POOR_SHARE:
+        progress(0.2, "mirrored map")
+        mounting = tuple(_mirrored_map(inputs, detected, before))
     if mounting:
         return (*lost, *mounting)
     apart = tuple(_disagreement(inputs.run))
@@ -180,6 +185,45 @@ def _mounting(inputs: MisfitInput, detected: DetectionLog, before: _Fit) -> Iter
         probably=f"{who} {meaning}",
         remedy=", ".join(cures),
     )
+
+
+def _mirrored_map(inputs: MisfitInput, detected: DetectionLog, before: _Fit) -> Iterator[Finding]:
+    """Suspect that the map is mirrored: then the vehicle turns the wrong way in it, too, and starts nowhere in it.
+
+    So it is looked for, in the map as it is and in the mirrored one: a wrong start alone fits both, or the first.
+    """
+
+    def sought(reflectors: ReflectorMap) -> _Fit:
+        parameters = inputs.setup.parameters
+        # Walls, tags and zones are those of the map as it is.
+        setup = replace(
+            inputs.setup,
+            reflectors=reflectors,
+            floor=None,
+            tags=(),
+            zones=(),
+            parameters=replace(parameters, supervisor=replace(parameters.supervisor, find_again=True)),
+        )
+        start = unknown_start_at(inputs.log.first_ns, reflectors.centers)
+        return _fit(replace(inputs, setup=setup, initial=start.state()), detected)
+
+    if len(inputs.setup.reflectors.reflectors) < FEWEST_TO_FIND:
+        return
+    mirrored = sought(ReflectorMap(tuple(map(_mirrored, inputs.setup.reflectors.reflectors))))
+    if mirrored.worst < GOOD_SHARE or mirrored.worst < sought(inputs.setup.reflectors).worst + 0.2:
+        return
+    yield Finding(
+        found=f"{PERCENT.text(before.accepted)} of the detections fit the reflectors, "
+        f"{PERCENT.text(mirrored.accepted)} once the map is mirrored and the vehicle is looked for in it",
+        probably="the map is mirrored: its y points down or to the right of x, as in images and some drawings",
+        remedy="change the sign of y of all reflectors, and of walls and routes that come from the same source",
+    )
+
+
+def _mirrored(reflector: Reflector) -> Reflector:
+    """Return a reflector on the other side of the x axis."""
+    heading = None if reflector.heading is None else -reflector.heading
+    return replace(reflector, y=-reflector.y, heading=heading)
 
 
 def _disagreement(run: RunColumns) -> Iterator[Finding]:

@@ -258,6 +258,20 @@ def test_draft_of_lif_2_is_driven_as_its_orientations_say_and_that_it_is_a_draft
     assert "several vehicleOrientations" in said
 
 
+@pytest.mark.parametrize("suffix", [".lif", ".json"])
+def test_draft_of_lif_2_with_origins_and_mobile_robots_is_read_as_version_1(tmp_path: Path, suffix: str) -> None:
+    edge = {"vehicleTypeIds": ["T"], "vehicleOrientations": [3.14159], "orientationType": "TANGENTIAL"}
+    old = layout(tmp_path, edge)
+    content = json.loads(old.read_text().replace("vehicleOrientations", "mobileRobotOrientations"))
+    text = json.dumps({**content, "origins": [{"originId": "O", "layouts": content.pop("layouts")}], "layouts": 0})
+    text = text.replace(', "layouts": 0', "").replace("vehicleTypeIds", "mobileRobotTypes")
+    text = text.replace('["T"]', '[{"manufacturer": "T", "seriesName": "1"}]').replace("vehicleType", "mobileRobotType")
+    (tmp_path / f"draft{suffix}").write_text(text)
+    convert_file(tmp_path / f"draft{suffix}", tmp_path / "project", ConvertOptions(vehicle_type="T 1"))
+    (route,) = load_project(tmp_path / "project").routes
+    assert route.segments[0].direction is Direction.REVERSE
+
+
 def test_published_version_of_lif_is_read_without_a_word(tmp_path: Path) -> None:
     edge = {"vehicleTypeId": "T", "vehicleOrientation": math.pi, "rotationAllowed": False}
     read = read_lif(layout(tmp_path, edge, version="1.0.0"))

@@ -17,6 +17,7 @@ from commission.simulation.scenario import virtual_drive
 from commission.site.disturbances import ConstantErrors, Disturbances, ScannerError
 from commission.site.project import Project
 from commission.site.record_log import RecordLog
+from commission.site.reflectors import ReflectorMap
 from commission.studies.misfit import MisfitInput, misfit
 from commission.studies.plausibility import Finding
 from commission.studies.start import start_of
@@ -49,6 +50,17 @@ def test_mirrored_or_turned_scanner_is_named(mistake: dict[str, Any], remedy: st
     findings = judged(drive(**mistake))
     assert remedy in findings[-1].remedy
     assert "lost" in findings[0].probably
+
+
+def test_a_mirrored_map_is_named_and_a_wrong_start_is_not_taken_for_one() -> None:
+    turned_over = tuple(replace(each, y=3.0 - each.y) for each in SETUP.reflectors.reflectors)
+    findings = judged(drive(120.0), replace(SETUP, reflectors=ReflectorMap(turned_over)))
+    assert findings[-1].remedy.startswith("change the sign of y of all reflectors")
+    log = drive(120.0)
+    elsewhere = replace(start(), mean=start().mean + np.array([3.0, 2.0, 1.0]))
+    run = whole_run.run(log, SETUP, elsewhere)
+    found = misfit(MisfitInput(log=log, setup=SETUP, initial=elsewhere, run=run))
+    assert not any("the map is mirrored" in each.probably for each in found)
 
 
 @pytest.mark.parametrize("bias", [-0.04, 0.03, 0.06])

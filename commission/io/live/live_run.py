@@ -146,26 +146,27 @@ class LiveRun:
             if self._run is not None:
                 self._run.begin_segment(self._setup, locate=True)
 
-    def so_far(self, now_ns: int | None = None) -> LiveResult:
+    def so_far(self, now_ns: int | None = None, *, judged: RunResult | None = None) -> LiveResult:
         """Return the run so far; its figures are those of a recording of the same drive.
 
         Parameters
         ----------
         now_ns : time by the host's clock [ns]: where no odometry came for a moment, the belief grows as far as the
             vehicle may have driven; None: it does not.
+        judged : a result of before that is given out again, since judging hours takes long; None: it is judged anew.
         """
         with self._lock:
             run, start = self._run, self._start
             if run is None or start is None:
                 return LiveResult(None, None, Mode.OPERATIONAL)
             belief, mode = belief_of(run.state), Mode(run.state.mode)
-            columns = run.columns() if len(run) else None
-            log, spent = self._log(), self._spent
+            columns = run.columns() if len(run) and judged is None else None
+            log, spent = (self._log() if columns is not None else None), self._spent
         silent_ns = 0 if now_ns is None else now_ns - max(self._odometry_ns, belief.stamp_ns)
         if silent_ns > NOTHING_HEARD_NS:
             belief = self.grown(belief, silent_ns * 1e-9)
-        if columns is None:
-            return LiveResult(None, belief, mode)
+        if columns is None or log is None:
+            return LiveResult(judged, belief, mode)
         inputs = RunInput(log=log, start=start, segments=columns.segments)
         return LiveResult(judge(inputs, columns, spent * 1e6 / len(columns)), belief, mode)
 

@@ -21,13 +21,14 @@ from commission.io.vda5050_states import StateStream
 from commission.site.project import Project
 from commission.site.records import Record
 from commission.studies.arrival import ArrivalOffset
+from commission.studies.run import RunResult
 
 log = logging.getLogger(__name__)
 
 TELL_S = 0.1
 """Time from one snapshot to the next [s]."""
 TELLING_SHARE = 0.1
-"""Share of its time that telling may take: of a run of hours, figures come less often."""
+"""Share of its time that judging the run may take: of hours, figures come less often, how sources do as ever."""
 CLOCKS_S = 2.0
 """Time from one look at what arrival says of the clocks to the next [s]."""
 WAIT_S = 0.1
@@ -135,8 +136,8 @@ class LiveRunner:
         """Throw the pose away: from the next scan on the vehicle looks where it is."""
         self.run.locate()
 
-    def snapshot(self) -> LiveSnapshot:
-        """Return how it goes now."""
+    def snapshot(self, judged: RunResult | None = None) -> LiveSnapshot:
+        """Return how it goes now; the run is that of before where there is one, else judged anew."""
         sorter = self.session.sorter
         told, late = Counter[str](sorter.told), Counter[tuple[int, type[Record]]](sorter.too_late)
         sources = tuple(
@@ -150,7 +151,7 @@ class LiveRunner:
         account = RecordAccount.of(statuses, self._taken, kinds, self._refused, is_given_up=is_given_up)
         now_ns = None if self._stopped.is_set() else self.session.clock.now_ns()
         mended = {words: count for words, count in told.items() if count}
-        run = self.run.so_far(now_ns)
+        run = self.run.so_far(now_ns, judged=judged)
         return LiveSnapshot(sources=sources, run=run, told=mended, account=account, clocks=self._clocks)
 
     def _localize(self) -> None:
@@ -190,11 +191,15 @@ class LiveRunner:
             log.exception("a record of a live source")
 
     def _tell(self) -> None:
-        looked = -math.inf
+        looked = due = -math.inf
+        judged: RunResult | None = None
         while not self._stopped.is_set():
             before = time.perf_counter()
             if before - looked > CLOCKS_S:
                 looked, self._clocks = before, self.session.clocks(self.run.scanner_names)
-            self._publish(self.snapshot())
-            spent = time.perf_counter() - before
-            self._stopped.wait(max(TELL_S, spent / TELLING_SHARE))
+            snapshot = self.snapshot(None if before >= due else judged)
+            self._publish(snapshot)
+            if before >= due:
+                after, judged = time.perf_counter(), snapshot.run.result
+                due = after + (after - before) / TELLING_SHARE
+            self._stopped.wait(TELL_S)

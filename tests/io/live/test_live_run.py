@@ -5,10 +5,13 @@ from __future__ import annotations
 import itertools
 import json
 import threading
+import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +20,7 @@ from commission.errors import UsageError
 from commission.geometry.arrays import FloatArray
 from commission.io.bundled import bundled_folder
 from commission.io.live.connection import Arrival
-from commission.io.live.live_run import LiveRun
+from commission.io.live.live_run import LiveResult, LiveRun
 from commission.io.live.registry import SourceAddress
 from commission.io.live.runner import LiveRunner, LiveSnapshot
 from commission.io.live.session import Session
@@ -345,3 +348,32 @@ def test_state_messages_while_it_drives_are_those_of_the_finished_run(
     assert localized[-1] is True
     with pytest.raises(UsageError, match="exists; expected a new file"):
         StateStream(StateFile(path=path), "again")
+
+
+def test_how_sources_do_is_told_while_the_figures_of_a_long_run_are_not_due() -> None:
+    told: list[Any] = []
+
+    def so_far(_now_ns: int | None, *, judged: Any = None) -> LiveResult:
+        time.sleep(0.0 if judged else 0.3)
+        result: Any = judged or object()
+        return LiveResult(result, None, Mode.OPERATIONAL)
+
+    nothing = SimpleNamespace(told={}, too_late={}, overrun={})
+    session: Any = SimpleNamespace(
+        sorter=nothing,
+        sources=(),
+        clock=SimpleNamespace(now_ns=lambda: 0),
+        clocks=lambda _names: (),
+        start=lambda: None,
+        stop=lambda: None,
+        rest=lambda: (),
+        records=lambda wait_s: time.sleep(wait_s) or (),
+    )
+    run: Any = SimpleNamespace(so_far=so_far, scanner_names=(), prepare=lambda: None, end=lambda: ())
+    runner = LiveRunner(session, run, told.append)
+    runner.start()
+    time.sleep(1.5)
+    results = [each.run.result for each in told]
+    runner.stop()
+    assert len(told) > 4
+    assert len({id(each) for each in results}) == 1
