@@ -103,12 +103,12 @@ def _tracking(routes: tuple[RouteRisks, ...], reflectors: ReflectorMap) -> list[
     lines: list[str] = []
     for each in routes:
         if not each.risks:
-            lines.append(f"Tracking     route {each.route!r}: no neighbor inside a gate")
+            lines.append(f"Tracking     route {each.route!r}: no neighbor to be mistaken for")
             continue
         worst = each.risks[0]
         names = [reflectors.reflectors[index].id for index in (worst.reflector, worst.neighbor)]
         lines.append(
-            f"Tracking     route {each.route!r}: neighbors inside the gate on {len(metres_at_risk(each.risks))} m; "
+            f"Tracking     route {each.route!r}: neighbors to be mistaken for on {len(metres_at_risk(each.risks))} m; "
             f"worst {names[0]} for {names[1]}, {PERCENT.text(worst.worst, '.1f')} of detections"
         )
     return lines

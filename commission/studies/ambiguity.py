@@ -183,7 +183,7 @@ def ambiguity(inputs: AmbiguityInput, progress: Progress = silent) -> AmbiguityR
 
 
 def misleading_neighbors(inputs: DrivesInput, progress: Progress = silent) -> tuple[RouteRisks, ...]:
-    """Find along each route the neighbors that lie inside each other's gate.
+    """Find along each route the neighbors that detections may be taken for.
 
     Parameters
     ----------
@@ -236,5 +236,5 @@ def summary(found: SiteAmbiguity) -> dict[str, Number | list[dict[str, str | Num
 
 
 def metres_at_risk(risks: tuple[NeighborRisk, ...]) -> IntArray:
-    """Numbers of the metres of the way at which any neighbor lies inside a gate."""
+    """Numbers of the metres of the way at which a detection may be taken for any neighbor."""
     return np.unique(np.concatenate([np.empty(0), *(risk.metres for risk in risks)]).astype(np.int64))

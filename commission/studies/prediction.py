@@ -71,7 +71,7 @@ class PredictionResult:
     stations: tuple[StationAccuracy, ...]
     """The stations on the route."""
     risks: tuple[NeighborRisk, ...]
-    """Neighbors inside each other's gate, the most probable mistake first."""
+    """Neighbors that detections may be taken for, the most probable mistake first."""
 
     @property
     def planned(self) -> PlannedRoute:

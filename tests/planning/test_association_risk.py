@@ -1,13 +1,14 @@
-"""Neighbors along a route: found where the gates meet, with the probability of a mistake."""
+"""Neighbors along a route: found where a detection may be taken for them, with the probability of a mistake."""
 
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 from scipy.stats import norm
 
-from commission.planning.association_risk import neighbor_risks
+from commission.planning.association_risk import mistaken, neighbor_risks
 from commission.planning.route_prediction import plan_route, predict_route
 from commission.site.parameters import FilterParameters, Parameters
 from commission.site.reflectors import ReflectorMap
@@ -17,6 +18,10 @@ from tests.planning.sites import open_field, reflectors_at, surely_detected
 CLOSE = ((3.0, 3.0), (8.0, -2.0), (12.0, 2.5), (12.05, 2.5), (18.0, -3.0))
 
 
+GATE = -2.0 * math.log(0.05)
+"""Of 95 % of two degrees of freedom."""
+FARTHEST = (3.1 + math.sqrt(GATE)) ** 2
+"""Beyond, fewer than one of a thousand detections is inside the neighbor's gate."""
 NOT_CONSIDERED = Parameters(filter=FilterParameters(consider=False))
 
 
@@ -24,6 +29,29 @@ def risks_of(places):
     planned = plan_route(open_field(places, parameters=NOT_CONSIDERED), "Line")
     prediction = predict_route(planned)
     return planned, prediction, neighbor_risks(planned, prediction)
+
+
+def taken(squared: float, gate: float = GATE) -> float:
+    """How much of a normal distribution is nearer to (d, 0) than to the origin, and inside the gate about it."""
+    d, g = math.sqrt(squared), math.sqrt(gate)
+
+    def across(x: float) -> float:
+        return norm.pdf(x) * (1.0 - 2.0 * norm.sf(math.sqrt(max(gate - (x - d) ** 2, 0.0))))
+
+    return quad(across, max(0.5 * d, d - g), d + g, epsabs=1e-12, epsrel=1e-9)[0]
+
+
+def test_a_mistaken_detection_is_nearer_to_the_neighbor_and_inside_its_gate():
+    d = np.array([0.0, 0.4, 1.5, math.sqrt(GATE), 4.0, 2.0 * math.sqrt(GATE), 5.5])
+    found = mistaken(d**2, GATE)
+    np.testing.assert_allclose(found, [taken(each) for each in d**2], rtol=1e-7)
+    assert found[0] == pytest.approx(0.5 * 0.95)
+    x, y = np.random.default_rng(0).normal(size=(2, 400_000, 1))
+    drawn = ((x > 0.5 * d) & ((x - d) ** 2 + y**2 <= GATE)).mean(axis=0)
+    # Four sigma of a share of 400,000.
+    np.testing.assert_allclose(drawn, found, atol=4.0 * np.sqrt(found.max() / 400_000))
+    # Without a gate it is the side of the line between both alone.
+    np.testing.assert_allclose(mistaken(d**2, math.inf), norm.sf(0.5 * d))
 
 
 def test_only_reflectors_close_to_each_other_are_named():
@@ -62,21 +90,19 @@ def surveyed(*sigmas: float):
 def test_probability_is_that_of_half_the_distance_in_the_reflectors_own_gate(sigmas: tuple[float, float]):
     planned, prediction, risks = surveyed(*sigmas)
     assert {(0, 1), (1, 0)} <= {(risk.reflector, risk.neighbor) for risk in risks}
-    # The gate of 95 % of two degrees of freedom is -2 ln 0.05.
-    gate = -2.0 * math.log(0.05)
     for risk in risks:
         for scan, probability in list(zip(risk.scans.tolist(), risk.probability, strict=True))[::20]:
             squared = separations(planned, prediction, scan)[risk.reflector, risk.neighbor]
-            assert squared <= gate
+            assert squared <= FARTHEST
             # Differences of 1e-10 in the oracle's Jacobian.
-            assert probability == pytest.approx(norm.sf(0.5 * math.sqrt(squared)), rel=1e-5)
+            assert probability == pytest.approx(taken(squared), rel=1e-5)
 
 
-def test_no_neighbor_within_a_gate_is_missed():
+def test_no_neighbor_that_a_detection_may_be_taken_for_is_missed():
     planned, prediction, risks = risks_of(CLOSE)
     found = {(risk.reflector, risk.neighbor): set(risk.scans.tolist()) for risk in risks}
     for scan in range(0, len(planned.drive), 37):
-        inside = separations(planned, prediction, scan) <= -2.0 * math.log(0.05)
+        inside = separations(planned, prediction, scan) <= FARTHEST
         for i in planned.visible.of(scan).tolist():
             for j in set(range(len(CLOSE))) - {i}:
                 assert inside[i, j] == (scan in found.get((i, j), set()))
@@ -150,8 +176,8 @@ def test_the_gate_is_that_of_a_filter_which_considers_survey_mounting_range_and_
             squared = float(d @ np.linalg.solve(innovations[k, one], d))
             risk = risks[one, other]
             at = np.flatnonzero(risk.scans == k)
-            assert len(at) == (squared <= -2.0 * math.log(0.05))
+            assert len(at) == (squared <= FARTHEST)
             if len(at):
-                assert risk.probability[at[0]] == pytest.approx(norm.sf(0.5 * math.sqrt(squared)), rel=1e-4)
+                assert risk.probability[at[0]] == pytest.approx(taken(squared), rel=1e-4)
                 checked += 1
     assert checked > 10

@@ -108,10 +108,10 @@ class RoutePanel(BasePanel):
 def _risk_text(route: RouteView) -> str:
     """Say whether a wrong association is to be feared, and on how much of the way zones leave reflectors out."""
     if not route.risks:
-        text = "No neighbors inside each other's gate: no wrong association expected."
+        text = "No neighbors that a detection may be taken for: no wrong association expected."
     else:
         listed = f", the first {MOST_RISKS} listed" if len(route.risks) > MOST_RISKS else ""
-        text = f"{len(route.risks)} neighbors inside the gate{listed}; a click goes there."
+        text = f"{len(route.risks)} neighbors may be taken for another{listed}; a click goes there."
     if route.by_two_sigma:
         text += (
             " Predicted is 2σ: the supervisor holds the protection level, which is larger, and may stop the vehicle "

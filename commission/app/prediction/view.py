@@ -21,7 +21,7 @@ Place: TypeAlias = tuple[float, float]
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RiskView:
-    """A reflector that may be taken for a neighbor inside its gate."""
+    """A reflector that may be taken for a neighbor."""
 
     reflector: str
     """Id of the one that is detected."""

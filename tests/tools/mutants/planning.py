@@ -78,8 +78,8 @@ PLANNING = (
     Mutant(
         name="mistaken beyond the whole distance",
         file=FOLDER + "association_risk.py",
-        find="ndtr(-0.5 *",
-        replace="ndtr(-1.0 *",
+        find="-0.5 * d / g",
+        replace="-1.0 * d / g",
         tests=(
             TESTS
             + "test_association_risk.py::test_probability_is_that_of_half_the_distance_in_the_reflectors_own_gate",
