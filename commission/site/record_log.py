@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.site.bearing_log import NO_BEARINGS, BearingLog
 from commission.site.record_store import ScanLog, ScanStore, stacked
+from commission.site.recorded_mounting import RecordedMounting
 from commission.site.recorded_start import RecordedStart
 from commission.site.records import (
     ORDER_WITHIN_A_STAMP,
@@ -66,6 +67,8 @@ class RecordLog:
     """The constants that were drawn for a virtual drive; None of a real vehicle."""
     start: RecordedStart | None = None
     """Where the vehicle was said to be when the recording began; None: nobody says."""
+    mountings: tuple[RecordedMounting, ...] = ()
+    """Where the recording says that its scanners are mounted."""
     notes: tuple[str, ...] = ()
     """What a reader mended or left out, one line each; none where the recording is as it should be."""
     scan_order: NDArray[np.int32] = field(init=False, repr=False)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from commission.geometry.angles import wrap
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.detector import threshold_at
 from commission.progress import Progress, silent
@@ -19,6 +20,7 @@ from commission.site.project import Project
 from commission.site.quantity import PERCENT, PLAIN_DEGREES, number_text
 from commission.site.record_log import RecordLog
 from commission.site.record_store import ScanStore
+from commission.site.recorded_mounting import LEANING
 from commission.site.scanner import Scanner
 from commission.studies.inputs import StudyInput
 from commission.studies.recording_overview import beams_in_words
@@ -38,6 +40,10 @@ _PERIODS_S = (0.0005, 5.0)
 """Usual time between two records of one kind [s]."""
 FARTHEST = 200.0
 """Range beyond which no scanner of this kind measures [m]."""
+MOUNTED_APART = 0.03
+"""Distance between two mountings of one scanner from which it is told [m]."""
+TURNED_APART = math.radians(1.0)
+"""The same of their headings [rad]."""
 _SEEN = ("detections", "scans")
 _FULL_SHARE = 0.99
 _TOLD_GAPS = 3
@@ -104,6 +110,7 @@ def plausibility(inputs: PlausibilityInput, progress: Progress = silent) -> tupl
         ("scans", _scans),
         ("reference", _reference),
         ("names of scanners", _unknown_scanners),
+        ("mountings", _mountings),
     )
     findings: list[Finding] = []
     for done, (name, check) in enumerate(checks):
@@ -427,6 +434,27 @@ def _intensities(name: str, values: FloatArray, ranges: FloatArray, detector: De
             found=f"no beam of the {name} reaches {where}",
             probably="no reflector can be detected",
             remedy="set the threshold between the intensities of walls and of reflectors",
+        )
+
+
+def _mountings(inputs: PlausibilityInput) -> Iterator[Finding]:
+    """Find scanners that the recording's transforms put elsewhere than the project."""
+    for said in inputs.log.mountings:
+        scanner = _scanner_of(inputs, said.scanner)
+        if scanner is None or said.lean > LEANING:
+            continue
+        x, y, heading = scanner.mounting.tolist()
+        is_far = math.hypot(said.x - x, said.y - y) > MOUNTED_APART
+        if not is_far and abs(wrap(said.heading - heading)) <= TURNED_APART and said.upside_down == scanner.upside_down:
+            continue
+        down = {True: ", upside down", False: ""}
+        own = f"[{x:.4g}, {y:.4g}, {heading:.4g}]{down[scanner.upside_down]}"
+        at = f"[{said.x:.4g}, {said.y:.4g}, {said.heading:.4g}]{down[said.upside_down]}"
+        yield Finding(
+            found=f"{scanner.name} is mounted at {at} in {said.base} of the recording, at {own} in the project"
+            " (x [m], y [m], heading [rad])",
+            probably=f"one of the two is wrong, or {said.base} is not the base whose motion the odometry tells",
+            remedy="correct the mounting in the project, or see to it that both count from the same point",
         )
 
 

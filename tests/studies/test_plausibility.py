@@ -10,6 +10,7 @@ import pytest
 
 from commission.errors import JobCancelled
 from commission.site.record_log import RecordLog
+from commission.site.recorded_mounting import RecordedMounting
 from commission.studies.plausibility import Finding, PlausibilityInput, plausibility
 from commission.studies.start import start_of
 from tests.studies.recorded import PROJECT, SECOND, drive, pose_at, scan_log
@@ -236,3 +237,17 @@ def test_a_single_record_tells_of_no_clock() -> None:
 def test_what_is_told_of_intensities_names_the_scanner() -> None:
     (finding,) = plausibility(PlausibilityInput.alone(two_scanners(MIXED, MIXED * 0.1)))
     assert finding.found.startswith("no beam of the scans of rear reaches")
+
+
+@pytest.mark.parametrize(
+    ("x", "heading", "upside_down", "told"),
+    [(0.02, 0.01, False, 0), (0.05, 0.0, False, 1), (0.0, 0.03, False, 1), (0.0, 0.0, True, 1)],
+)
+def test_a_mounting_of_the_recording_that_is_not_the_project_s_is_told(
+    x: float, heading: float, upside_down: bool, told: int
+) -> None:
+    said = RecordedMounting(
+        scanner="scanner", base="base_link", x=x, y=0.0, heading=heading, upside_down=upside_down, lean=0.0
+    )
+    found = judged(dataclasses.replace(drive(), mountings=(said,)))
+    assert [each.found.startswith("scanner is mounted at [") for each in found] == [True] * told

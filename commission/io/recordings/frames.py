@@ -9,14 +9,13 @@ import numpy as np
 
 from commission.geometry.arrays import FloatArray
 from commission.io.recordings.ros_messages import transform_of
+from commission.site.recorded_mounting import RecordedMounting
 
 BASES = ("base_link", "base_footprint", "base", "base_frame")
 """Frames of a vehicle, the preferred one first (REP 105)."""
 _DEEPEST = 32
 _MOVED = 1e-6
 _LEVEL = 1e-9
-_TILT = 5.0
-"""Angle of the plane of a scanner with the floor from which it is told [deg]."""
 
 
 class Frames:
@@ -35,36 +34,40 @@ class Frames:
             self._moving.add(child)
         self._parent[child] = parent, pose
 
-    def mounting(self, frame: str, base: str) -> str:
-        """Mounting of a scanner in words; empty where the transforms do not tell.
+    def mounting(self, scanner: str, frame: str, base: str) -> RecordedMounting | None:
+        """Mounting of a scanner; None where the transforms do not tell.
 
         Parameters
         ----------
-        frame : of the scanner.
-        base : of the vehicle, as its odometry calls it; the usual names are tried, too.
+        scanner, frame : its name, and its frame.
+        base : of the vehicle, as its odometry calls it; where that is not reached, the nearest of the usual names.
         """
-        T_frame_scanner = np.eye(4)
-        wanted = {base.strip("/"), *BASES} - {""}
+        T_frame_scanner, nearest = np.eye(4), None
+        own = base.strip("/")
         for _ in range(_DEEPEST):
-            if frame in wanted:
-                return _in_words(frame, T_frame_scanner)
+            if frame == own:
+                return _mounted(scanner, frame, T_frame_scanner)
+            if nearest is None and frame in BASES:
+                # Taken unless what the odometry moves is further up: `base_footprint` often is.
+                nearest = _mounted(scanner, frame, T_frame_scanner)
             step = self._parent.get(frame)
             if step is None or frame in self._moving:
-                return ""
+                break
             frame, T_frame_scanner = step[0], step[1] @ T_frame_scanner
-        return ""
+        return nearest
 
 
-def _in_words(base: str, T_base_scanner: FloatArray) -> str:
-    """Place [m] and heading [rad] of a scanner in the frame of its vehicle."""
+def _mounted(scanner: str, base: str, T_base_scanner: FloatArray) -> RecordedMounting:
+    """Place, heading and lean of a scanner in the frame of its vehicle."""
     # Adding 0 makes -0 a 0; what is left of a turn by rounding is none, either.
     x, y = np.round(T_base_scanner[:2, 3], 9) + 0.0
-    heading = math.atan2(T_base_scanner[1, 0], T_base_scanner[0, 0])
     up = float(T_base_scanner[2, 2])
-    down = ", upside down" if up < -_LEVEL else ""
-    # What measures in a plane that leans sees no hall; a camera's optical frame stands upright.
-    tilt = math.degrees(math.acos(min(1.0, abs(up))))
-    leaning = (
-        f", its plane leaning by {tilt:.3g} deg: expected is the frame in which it measures" if tilt > _TILT else ""
+    return RecordedMounting(
+        scanner=scanner,
+        base=base,
+        x=float(x),
+        y=float(y),
+        heading=math.atan2(T_base_scanner[1, 0], T_base_scanner[0, 0]),
+        upside_down=up < -_LEVEL,
+        lean=math.acos(min(1.0, abs(up))),
     )
-    return f"[{x:.4g}, {y:.4g}, {heading:.4g}]{down}{leaning} (x [m], y [m], heading [rad] in {base})"

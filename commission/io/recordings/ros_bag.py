@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from commission.io.recordings.frames import Frames
 from commission.io.recordings.ros_source import BagMessage, is_bag, open_bag
 from commission.io.recordings.whole import WholeRecording
 from commission.site.record_log import RecordLog
+from commission.site.recorded_mounting import RecordedMounting
 from commission.site.scanner import ONLY_NAME
 
 
@@ -51,8 +53,9 @@ class RosBag(WholeRecording):
             self.options.wheels,
         )
         try:
-            notes = self._read(_Reading(self.chosen, self.scanners, collector, self.options))
-            return collector.log(notes)
+            reading = _Reading(self.chosen, self.scanners, collector, self.options)
+            notes = self._read(reading)
+            return replace(collector.log(notes), mountings=reading.mountings())
         finally:
             collector.close()
 
@@ -173,10 +176,13 @@ class _Reading:
                 f"themselves (range_max {farthest:g} m, typical range {typical:.4g}): nothing is left of them; "
                 "are they in millimetres, or is range_max wrong?"
             )
-        for scanner, frame in self._frame_of.items():
-            mounted = self.frames.mounting(frame, self._base)
-            if mounted:
-                yield f"scanner {scanner!r} is mounted at {mounted}"
+        for mounting in self.mountings():
+            yield f"scanner {mounting.scanner!r} is mounted at {mounting.words}"
+
+    def mountings(self) -> tuple[RecordedMounting, ...]:
+        """Mountings of those scanners of which the transforms tell."""
+        found = (self.frames.mounting(name, frame, self._base) for name, frame in self._frame_of.items())
+        return tuple(each for each in found if each is not None)
 
 
 def _frame(header: Any) -> str:

@@ -274,6 +274,16 @@ def test_mounting_is_told_through_all_frames_between(tmp_path: Path, kind: str) 
     assert told in log.notes
 
 
+def test_mounting_is_that_in_the_frame_that_the_odometry_moves(tmp_path: Path) -> None:
+    # The odometry moves `base_link`, here above `base_footprint`.
+    messages = [
+        bags.transform(START, "base_link", "base_footprint", (0.5, 0.0, 0.0)),
+        bags.transform(START, "base_footprint", "laser", (0.25, 0.0, 0.0)),
+    ]
+    (found,) = read(tmp_path, [*messages, *drive()]).mountings
+    assert (found.base, found.x) == ("base_link", 0.75)
+
+
 def test_time_of_recording_stands_where_a_message_has_none(tmp_path: Path) -> None:
     topic, kind, _, make = bags.scan(0, ECHO)
 
