@@ -126,7 +126,7 @@ def test_the_heatmap_follows_a_dragged_reflector(page: OpenPage, site: OpenSite)
 
 
 def test_a_route_is_predicted_over_its_metres(page: OpenPage, site: OpenSite) -> None:
-    page.fold("Along a route")
+    page.fold("Prediction along a route")
     page.choose("Route", site.project.routes[0].name)
     page.wait_for_text("Supervisor stops")
     assert site.runtime.service(PredictionService).view is not None
@@ -137,7 +137,7 @@ def test_a_layout_is_suggested_accepted_and_taken_back(page: OpenPage, site: Ope
     page.choose("Show", "Position dilution (DOP)")
     site.until(lambda: site.heat is not None and site.heat.scale.figure is Figure.POSITION_DOP)
     before, whole = site.heat, site.runtime.state.project
-    page.fold("Along a route")
+    page.fold("Prediction along a route")
     page.fold("Suggested layout")
     page.tick("Keep present")
     page.fold("Routes that count")

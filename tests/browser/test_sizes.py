@@ -54,6 +54,13 @@ CUT_OFF = """() => {
   }
   return found;
 }"""
+LINES_OF_LABELS = """() => [...document.querySelectorAll('[data-dock-region=left] label')].filter(
+  (each) => each.checkVisibility() && each.textContent).map((each) => {
+  const words = document.createRange();
+  words.selectNodeContents(each);
+  return [each.textContent, new Set([...words.getClientRects()].map((box) => Math.round(box.top))).size];
+})"""
+"""Each label of the steps, and in how many lines it stands."""
 TOOL = """(name) => [...document.querySelectorAll('div:has(>.c-rail)+div button')]
   .find((each) => each.textContent === name)"""
 LIT = """() => [...document.querySelectorAll('div:has(>.c-rail)+div button')]
@@ -93,6 +100,11 @@ def test_no_button_or_name_is_cut_off_at_any_size(served: Served, window: Callab
         names = page.page.evaluate("() => window.commissionPlots.namesShown")
         assert {"x", "y", "largest", "inliers", "outliers"} <= {name.split(" ")[0] for name in names}, (width, names)
     assert found == {size: [] for size in SIZES}
+    # A check box has its line to itself, and no name is a column of words.
+    for tab, most in (("Run", 1), ("Tune", 2)):
+        page.open_tab(tab)
+        page.page.wait_for_function(f"() => ({LINES_OF_LABELS})().length > 5")
+        assert [name for name, lines in page.page.evaluate(LINES_OF_LABELS) if lines > most] == []
     # In the lowest window a table has rows, and a list of corners is seen to its end.
     page.page.set_viewport_size({"width": SIZES[0][0], "height": SIZES[0][1]})
     page.open_tab("Reflectors")

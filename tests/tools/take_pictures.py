@@ -120,7 +120,7 @@ def folded_at_run(page: OpenPage, _runtime: Runtime) -> None:
 def predicted_by_every_kind(page: OpenPage, runtime: Runtime) -> None:
     """The first route is predicted, and driven by every kind."""
     page.open_tab("Plan")
-    page.fold("Along a route")
+    page.fold("Prediction along a route")
     page.page.locator(".c-fold").click()
     route = runtime.state.project.routes[0].name
     runtime.post(PredictRoute(route))
@@ -177,7 +177,7 @@ def heatmap(page: OpenPage, runtime: Runtime) -> None:
 def predicted(page: OpenPage, runtime: Runtime) -> None:
     """What the filter will say along a route."""
     page.open_tab("Plan")
-    page.fold("Along a route")
+    page.fold("Prediction along a route")
     page.choose("Route", runtime.state.project.routes[1].name)
     until(lambda: runtime.service(PredictionService).view is not None)
 

@@ -87,13 +87,16 @@ div:has(>div>.c-bottom):has(.c-no-run)>:nth-child(4){{grid-column:1/span 24!impo
 [data-dock-region=right]{{box-sizing:border-box;padding-top:var(--c-now)}}
 div:has(>div>.c-top)>div:has(.c-now){{position:absolute}}
 .c-now{{position:fixed;z-index:1;top:var(--c-top);right:0;width:var(--c-right);height:var(--c-now);
- box-sizing:border-box;overflow:hidden auto;overflow-anchor:none;scrollbar-width:thin;padding:5px 14px 0 8px;
- scroll-snap-type:y mandatory;scroll-padding-top:5px;border-bottom:1px solid {css(Surface.EDGE.dark)}}}
+ box-sizing:border-box;overflow:hidden auto;overflow-anchor:none;scrollbar-width:thin;padding:0 14px 0 8px;
+ scroll-snap-type:y mandatory;border-top:5px solid transparent;border-bottom:1px solid {css(Surface.EDGE.dark)}}}
 .c-now .c-table{{line-height:{NOW_LINE_PX}px}}
 .c-now .c-table td{{padding-top:0;padding-bottom:0}}
 .c-now tr{{scroll-snap-align:start}}
-.c-now .c-table td:first-child{{width:1px;white-space:nowrap}}
-.c-now .c-table .c-one td:last-child{{white-space:normal}}
+.c-now .c-table :is(table,tbody){{display:block}}
+.c-now .c-table tr{{display:flex;justify-content:space-between}}
+.c-now .c-table tr:not(.c-one){{flex-wrap:wrap}}
+.c-now .c-table tr:not(.c-one) td:last-child{{flex:1 0 auto;max-width:100%}}
+.c-now .c-table td:first-child{{width:auto;white-space:nowrap}}
 {LIT_CAMERA}{{background:{css(Worded.PRESS.dark)}!important;border-color:{css(Worded.PRESS.dark)}!important;
  color:#fff!important}}
 .c-s-plots{{margin-right:calc(34vw + 8px)}}

@@ -188,6 +188,8 @@ def path_mark(kind: str) -> str:
     return f"<div class='c-path' data-path='{kind}'></div>"
 
 
+LABEL = "[data-dock-region] .mantine-Flex-root>[style*='flex-shrink: 0']:has(>p>label)"
+"""Where the label of a widget stands: wide enough for most in one line; one of a check box has the line to itself."""
 LIVE = "<div class='c-live'></div>"
 """An html element that lets the text field behind it tell of every key: one that seeks, and changes nothing."""
 
@@ -195,7 +197,10 @@ LIVE = "<div class='c-live'></div>"
 # floating panel of the time line into a strip at the bottom, and take their space from the floor. Where a rule does not
 # match (another viser), the panels float and everything still works.
 STYLE = f"""<style>
-:root{{--c-selected-line:rgb{SELECTED_LINE};--c-top:{TOP_BAR_PX}px;--c-bottom:{BOTTOM_PX}px;--c-tabs:{TABS_PX}px;
+:root[data-mantine-color-scheme=light] [data-variant=outline]{{--button-color:{css(BRAND)}!important}}
+:root{{--mantine-primary-color-filled:{css(BRAND)}!important;
+ --mantine-primary-color-filled-hover:{css(Worded.PRESS.dark)}!important;
+ --c-selected-line:rgb{SELECTED_LINE};--c-top:{TOP_BAR_PX}px;--c-bottom:{BOTTOM_PX}px;--c-tabs:{TABS_PX}px;
  --c-floor:{LEFT_PX + 4}px;--c-right:{RIGHT_PX + 4}px}}
 [data-dock-root]{{height:calc(100% - var(--c-top) - var(--c-bottom))!important;top:var(--c-top);
  overflow:visible!important}}
@@ -231,6 +236,7 @@ div:has(>div>.c-bottom)>:nth-child(-n+5){{grid-row:1}}
 div:has(>div>.c-bottom)>:nth-child(1){{grid-column:13}}
 div:has(>div>.c-bottom)>:nth-child(2){{grid-column:1/span 7;padding-left:var(--c-tabs)!important}}
 div:has(>div>.c-bottom)>:nth-child(2) button{{padding:0 5px!important}}
+[role=tab][aria-selected=true]{{color:var(--mantine-color-text)!important}}
 [data-floating-window]:has(.c-bottom) [role=tab]{{padding-left:3px!important;padding-right:3px!important}}
 div:has(>div>.c-bottom)>:nth-child(3){{grid-column:8/span 2}}
 div:has(>div>.c-bottom)>:nth-child(4){{grid-column:10/span 3}}
@@ -295,6 +301,13 @@ div:has(>div>.c-route)>:nth-child(1){{grid-column:span 3;padding-left:var(--c-ta
 .c-route{{font-size:12px;height:44px;display:flex;align-items:center;white-space:nowrap;overflow:hidden}}
 div:has(>:is(.c-wide,.c-live,.c-path,.c-list-line)){{display:none}}
 input:not(:focus){{text-overflow:ellipsis}}
+{LABEL}{{width:126px!important;padding-right:4px!important}}
+{LABEL}:has(+* .mantine-Slider-track){{width:130px!important}}
+{LABEL} .mantine-Text-root{{letter-spacing:-.4px!important;font-size:12px!important}}
+{LABEL}:has(+* .mantine-Slider-track) .mantine-Text-root{{letter-spacing:-.5px!important;font-size:11.5px!important}}
+.mantine-Slider-root+*,.c-tail-tick+*{{width:50px!important;margin-left:5px!important}}
+.mantine-Flex-root:has(>div input[type=checkbox])>:has(>p>label){{flex:1 1 auto!important}}
+.mantine-Flex-root:has(>div input[type=checkbox])>:not(:has(label)){{flex:none!important}}
 div:has(>.c-wide)+*>.mantine-Flex-root>[style*="flex-shrink: 0"]{{display:none}}
 div:has(>.c-tools)+* .mantine-Button-root{{padding:0 4px!important;font-size:11px!important;min-width:0!important;
  flex:1 1 auto!important}}

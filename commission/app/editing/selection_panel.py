@@ -135,6 +135,11 @@ class SelectionPanel(BasePanel):
         return get_field(self._reflectors[0], name) if self._reflectors else None
 
 
+def _called(kind: str, name: str) -> str:
+    """Return what something is called, with its kind unless the name begins with that."""
+    return escaped(name) if name.lower().startswith(kind.lower()) else f"{kind} {escaped(name)}"
+
+
 def _company(browser: int, browsers: int) -> str:
     """Say which browser this is where there are others: an undo that is another's names that one by its number."""
     if browsers < 2:
@@ -164,10 +169,9 @@ def _head(editor: Editor, reflectors: tuple[Reflector, ...], project: Project) -
     elif reflectors:
         title = f"Reflector {escaped(reflectors[0].id)}"
     elif editor.point is not None:
-        title = f"Route {escaped(editor.point.route)}"
+        title = _called("Route", editor.point.route)
     elif tag is not None:
         title = f"Tag {escaped(tag.id)}"
     else:
-        named = editor.station.lower().startswith("station")
-        title = escaped(editor.station) if named else f"Station {escaped(editor.station)}"
+        title = _called("Station", editor.station)
     return f"<div style='padding:2px 14px 2px 6px'>{table(rows)}<div class='c-selected'><b>{title}</b></div></div>"

@@ -42,7 +42,7 @@ class PlaceTool(Tool):
 
     def hint(self, state: AppState, browser: int) -> str:
         """Say what a click does."""
-        where = " at the nearest wall" if editor_of(state, browser).snapping.walls else ""
+        where = " at the nearest wall" if state.project.floor_map and editor_of(state, browser).snapping.walls else ""
         return f"Place: click on the floor for a reflector{where} &nbsp; (Esc ends)"
 
 

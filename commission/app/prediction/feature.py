@@ -16,7 +16,12 @@ FEATURE = Feature(
     services=(PredictionService,),
     layers=(RibbonLayer, EventLayer),
     panels=(
-        Docked(make=lambda at: RoutePanel(at.gui, at.post, at.container), tab=PLAN, rank=20, folder="Along a route"),
+        Docked(
+            make=lambda at: RoutePanel(at.gui, at.post, at.container),
+            tab=PLAN,
+            rank=20,
+            folder="Prediction along a route",
+        ),
         Docked(make=lambda at: LimitLegend(at.gui), tab=LAYERS, rank=14),
     ),
 )

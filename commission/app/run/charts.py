@@ -32,12 +32,23 @@ class Line:
     """From a run and some of its cycles to one value for each, in the plot's unit; NaN where it is unknown."""
     of_detections: bool = False
     """Whether it is of detections and not of cycles: a cycle may have several or none."""
+    of_scans: bool = False
+    """Whether a frame of a camera or a reflex of a goniometer has none: the curve goes on to the next scan."""
     by_level: bool = False
     """Whether it is there only where the supervisor goes by protection levels."""
 
     def values(self, run: RunResult, rows: slice = slice(None)) -> FloatArray:
         """Return the values of a run, or of some rows of it; in the plot's unit."""
-        return self.part(run, rows)
+        values, is_scan = self.part(run, rows), run.columns.detected.is_scan if self.of_scans else None
+        return values if is_scan is None else np.where(is_scan[rows], values, math.nan)
+
+    def last_scan(self, run: RunResult, cycle: int) -> int:
+        """Return the cycle whose value holds at a cycle, for a curve of scans the last scan; -1 where there is none."""
+        is_scan = run.columns.detected.is_scan if self.of_scans else None
+        if is_scan is None:
+            return cycle
+        back = is_scan[cycle::-1]
+        return cycle - int(np.argmax(back)) if back.any() else -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,12 +197,14 @@ CHARTS = (
                 column="inliers",
                 color=theme.css(theme.INLIER),
                 part=lambda run, at: run.counts[at, Status.INLIER].astype(float),
+                of_scans=True,
             ),
             Line(
                 label="outliers",
                 column="outliers",
                 color=theme.css(theme.OUTLIER_ASSOCIATION),
                 part=lambda run, at: run.counts[at, Status.OUTLIER_DETECTOR :].sum(axis=1).astype(float),
+                of_scans=True,
             ),
         ),
         least=4.0,

@@ -85,7 +85,18 @@ def binned(run: RunResult, line: Line, bins: Bins) -> tuple[FloatArray, FloatArr
     if not len(bins):
         return np.empty(0), np.empty(0)
     begin = int(firsts[0])
-    return extremes(line.values(run, slice(begin, int(afters[-1]))), firsts - begin, afters - begin)
+    values = line.values(run, slice(begin, int(afters[-1])))
+    if line.of_scans:
+        before = line.last_scan(run, begin)
+        values = _going_on(values, math.nan if before < 0 else float(line.values(run, slice(before, before + 1))[0]))
+    return extremes(values, firsts - begin, afters - begin)
+
+
+def _going_on(values: FloatArray, before: float) -> FloatArray:
+    """Return (n,) values, each that is NaN replaced by the last known one; by `before` where none is known yet."""
+    known = np.isfinite(values)
+    last = np.maximum.accumulate(np.where(known, np.arange(len(values)), -1))
+    return np.where(last < 0, before, values[last])
 
 
 def axis_of(chart: Chart, parameters: Iterable[Parameters], largest: float) -> Span:
@@ -154,6 +165,8 @@ def _limit(run: RunResult, limit: Limit) -> dict[str, Any]:
 
 
 def _at(run: RunResult, line: Line, cycle: int) -> list[float] | None:
+    if cycle >= 0:
+        cycle = line.last_scan(run, cycle)
     if cycle < 0:
         return None
     rows = slice(cycle, cycle + 1)

@@ -77,4 +77,4 @@ def sightings_told(found: FrameTags | None) -> list[tuple[str, str]]:
     largest = f"{known.max():.2f}" if len(known) else "none met"
     unused = len(found.uses) - np.count_nonzero(right) - np.count_nonzero(rejected)
     counts = f"{np.count_nonzero(right)}, {np.count_nonzero(rejected)}, {unused}"
-    return [("Tags: in, out, unused", counts), ("Largest of tags / gate", f"{largest} / {found.gate:.2f}")]
+    return [("Tags: in, out, unused", counts), ("Tags, largest NIS / gate", f"{largest} / {found.gate:.2f}")]

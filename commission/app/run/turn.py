@@ -78,5 +78,5 @@ def turn_told(turn: Turn | None) -> list[tuple[str, str]]:
     gate = f"{turn.gate:.2f}" if math.isfinite(turn.gate) else "none"
     return [
         ("Bearings of a turn", f"{accepted} accepted, {rejected} rejected, {unused} unused"),
-        ("Largest of bearings / gate", f"{largest} / {gate}"),
+        ("Bearings, largest NIS / gate", f"{largest} / {gate}"),
     ]

@@ -26,6 +26,7 @@ from commission.app.run.state import PlotWindow
 from commission.geometry.arrays import read_only
 from commission.localization.estimate import Status
 from commission.localization.setup import LocalizerSetup
+from commission.localization.tag_frames import TagCycles
 from commission.site.fields import with_field
 from commission.site.parameters import Parameters
 from commission.site.project import Project
@@ -67,6 +68,41 @@ def test_a_few_cycles_are_sent_one_by_one_and_the_smallest_only_once(result: Run
     assert line["high"] == ""
     np.testing.assert_array_equal(numbers(line["low"]), result.counts[:, Status.INLIER])
     np.testing.assert_allclose(numbers(sent["times"]), result.times, atol=1e-5)
+
+
+def with_frames(result: RunResult) -> RunResult:
+    """The same drive, of which the first two cycles and every third one are frames of a camera that saw no tag."""
+    is_frame = np.arange(result.cycles) % 3 == 0
+    is_frame[1] = True
+    nothing = np.zeros(result.cycles + 1, np.int64)
+    tags = TagCycles(
+        is_frame=is_frame,
+        offsets=nothing,
+        sightings=np.empty((0, 6)),
+        ids=np.empty(0, str),
+        numbers=np.cumsum(is_frame) - is_frame,
+    )
+    columns = replace(result.columns, detected=replace(result.columns.detected, tags=tags))
+    counts = np.where(is_frame[:, np.newaxis], 0, result.counts)
+    return replace(result, columns=columns, counts=read_only(counts.astype(np.int32)))
+
+
+def test_frames_of_a_camera_are_no_scans_without_inliers(result: RunResult) -> None:
+    mixed = with_frames(result)
+    line = COUNTS.lines[0]
+    sent = numbers(message(mixed, COUNTS)["charts"][0]["lines"][0]["low"])
+    counted = result.counts[:, Status.INLIER].astype(float)
+    assert np.isnan(sent[:2]).all(), "nothing is known before the first scan"
+    for cycle in range(2, result.cycles):
+        last = cycle - 1 if cycle % 3 == 0 else cycle
+        assert sent[cycle] == counted[last]
+        assert values_at(mixed, [COUNTS], cycle)[0][0] == [counted[last], counted[last]]
+    assert values_at(mixed, [COUNTS], 1)[0][0] is None
+    # A table says of a frame that it is no scan, and a span that begins with one goes on from the scan before it.
+    assert np.isnan(line.values(mixed)[::3]).all() and np.isfinite(line.values(mixed)[2::3]).all()
+    begin = float(result.times[31])
+    zoomed = numbers(message(mixed, COUNTS, span=(begin, begin + 1.0))["charts"][0]["lines"][0]["low"])
+    assert zoomed[0] == counted[29]
 
 
 def test_what_is_unknown_for_a_while_is_unknown_there_and_not_0(result: RunResult) -> None:

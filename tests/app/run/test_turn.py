@@ -59,7 +59,7 @@ def test_a_turn_is_drawn_and_told_beside_the_scan_that_came_before_it() -> None:
     assert apart.max() < 0.05
     told = dict(rows(view))
     assert told["Bearings of a turn"] == "3 accepted, 1 rejected, 0 unused"
-    assert told["Largest of bearings / gate"].endswith(" / 10.83")
+    assert told["Bearings, largest NIS / gate"].endswith(" / 10.83")
     assert told["Inliers"] == "3"
     assert "Bearings accepted / rejected" in summary(result, ())
     server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
