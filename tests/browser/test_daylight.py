@@ -11,6 +11,7 @@ from PIL import Image
 
 from commission.app.base.paints import Color, Floor
 from commission.app.run.actions import Play, VirtualDrive
+from tests.app.base.test_theme import contrast
 from tests.app.sites import room
 from tests.browser.page import OpenPage
 from tests.browser.serving import Served
@@ -30,6 +31,16 @@ def share_of(picture: Path, color: Color) -> float:
     """Share of the pixels of a picture that have a color."""
     pixels = np.asarray(Image.open(picture).convert("RGB"), np.int64)
     return float((np.abs(pixels - np.array(color)).max(axis=2) <= 3).mean())
+
+
+COLORS = """(button) => {
+  const numbers = (color) => color.match(/[\\d.]+/g).map(Number);
+  let ground = button;
+  while (numbers(getComputedStyle(ground).backgroundColor)[3] === 0) ground = ground.parentElement;
+  return [button, ground].map((each, index) =>
+    numbers(getComputedStyle(each)[index ? 'backgroundColor' : 'color']).slice(0, 3));
+}"""
+"""Colors of a button's words and of what is behind them, as they are drawn."""
 
 
 def switch(page: OpenPage, label: str) -> None:
@@ -63,6 +74,10 @@ def test_the_light_theme_is_light_all_over_and_stays_with_the_browser_that_chose
             page.page.reload()
             page.wait_for_client(before)
             page.wait_until_drawn(("/floor/map", "/vehicle/outline"))
+    page.open_tab("Run")
+    for name in ("Step", "Fit", "Drive"):
+        words, ground = page.page.get_by_role("button", name=name, exact=True).first.evaluate(COLORS)
+        assert contrast(words, ground) >= 4.5, name
     other.screenshot(tmp_path / "other.png")
     assert share_of(tmp_path / "other.png", Floor.FREE.dark) > 0.05
     switch(page, "Dark theme")

@@ -197,7 +197,7 @@ LIVE = "<div class='c-live'></div>"
 # floating panel of the time line into a strip at the bottom, and take their space from the floor. Where a rule does not
 # match (another viser), the panels float and everything still works.
 STYLE = f"""<style>
-:root[data-mantine-color-scheme=light] [data-variant=outline]{{--button-color:{css(BRAND)}!important}}
+:root.c-light [data-variant=outline]{{--button-color:{css(BRAND)}!important}}
 :root{{--mantine-primary-color-filled:{css(BRAND)}!important;
  --mantine-primary-color-filled-hover:{css(Worded.PRESS.dark)}!important;
  --c-selected-line:rgb{SELECTED_LINE};--c-top:{TOP_BAR_PX}px;--c-bottom:{BOTTOM_PX}px;--c-tabs:{TABS_PX}px;
