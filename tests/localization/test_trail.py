@@ -117,7 +117,8 @@ def trail_of(drive: Drive) -> Trail:
 @pytest.mark.parametrize("shift", [0.0, 0.25, 3.0])
 def test_a_pose_is_led_along_as_a_plain_filter_with_matrices_leads_it(forth: bool, shift: float) -> None:
     setup = setup_of(3)
-    drive = sparse_drive(setup, 3, dataclasses.replace(PLAN, scans=30))
+    # Slowly, so that scans count in part, or fast.
+    drive = sparse_drive(setup, 3, dataclasses.replace(PLAN, scans=30, speed=0.3 if forth else 1.0))
     trail, around = trail_of(drive), search_map(setup)
     begin = drive.truth[0 if forth else -1] + np.array([shift, -0.5 * shift, 0.1 * shift])
     p = np.diag((0.09, 0.09, 0.0225))
@@ -167,6 +168,26 @@ def test_a_pose_contradicts_the_reflectors_that_what_it_sees_of_them_lies_beside
     assert (found.misfit > 0.05**2) == (off > 0.0)
     # What moves nobody by a part of the supervisor's limit is no contradiction.
     assert contradiction(pose, trail, around._replace(harmless=0.4)).contradicted == 0
+
+
+def test_a_pose_found_among_things_beside_their_places_is_less_sure() -> None:
+    setup, rng = setup_of(1), np.random.default_rng(0)
+    drive = sparse_drive(setup, 1)
+    beside = [
+        dataclasses.replace(each, x=each.x + dx, y=each.y + dy)
+        for each, (dx, dy) in zip(setup.reflectors.reflectors, rng.normal(0.0, 0.15, (25, 2)).tolist(), strict=True)
+    ]
+    sigmas, errors = [], []
+    for reflectors in (setup.reflectors, ReflectorMap(tuple(beside))):
+        told = dataclasses.replace(setup, reflectors=reflectors)
+        columns = run(drive.log, told, unlocated(told))
+        located = int(np.flatnonzero(columns.modes != Mode.INITIALIZING)[0])
+        covariance, error = columns.covariances[located, :2, :2], (columns.means - drive.truth)[located, :2]
+        sigmas.append(math.sqrt(np.linalg.eigvalsh(covariance)[-1]))
+        errors.append(error @ np.linalg.solve(covariance, error))
+    assert sigmas[1] > 1.2 * sigmas[0]
+    # Chi-square of two degrees of freedom, 99 %.
+    assert max(errors) < 9.2
 
 
 def test_a_trail_keeps_the_newest_of_the_way_and_no_scan_that_saw_nothing() -> None:

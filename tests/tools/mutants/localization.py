@@ -18,6 +18,8 @@ TEXTBOOK = PROTECTION + "test_the_level_is_that_of_textbook_filters_and_the_mode
 
 CONTRADICTS = TESTS + "test_trail.py::test_a_pose_contradicts_the_reflectors_that_what_it_sees_of_them_lies_beside"
 
+LED = TESTS + "test_trail.py::test_a_pose_is_led_along_as_a_plain_filter_with_matrices_leads_it"
+
 SEVERAL = TESTS + "test_several_scans.py::"
 
 LOCALIZATION = (
@@ -64,7 +66,7 @@ LOCALIZATION = (
         file=FOLDER + "trail_fit.py",
         find="evidence += min(gains[entry], bound)",
         replace="evidence += gains[entry]",
-        tests=(TESTS + "test_trail.py::test_a_pose_is_led_along_as_a_plain_filter_with_matrices_leads_it",),
+        tests=(LED,),
     ),
     Mutant(
         name="what is seen of a reflector on average is as noisy as a single detection",
@@ -96,6 +98,51 @@ LOCALIZATION = (
         find="misfit += d2",
         replace="misfit += 0.0",
         tests=(TESTS + "test_start.py::test_things_that_scatter_more_than_stated_tell_a_pose_less_surely",),
+    ),
+    Mutant(
+        name="a trail keeps all of the way, however long ago it was seen",
+        file=FOLDER + "trail.py",
+        find="(to_come < LONGEST_WAY)",
+        replace="(to_come < math.inf)",
+        tests=(TESTS + "test_trail.py::test_a_trail_keeps_the_newest_of_the_way_and_no_scan_that_saw_nothing",),
+    ),
+    Mutant(
+        name="a vehicle at rest takes every scan of a trail for a new one",
+        file=FOLDER + "trail_fit.py",
+        find="1.0 / max(counts, LEAST_COUNTED)",
+        replace="1.0",
+        tests=(LED,),
+    ),
+    Mutant(
+        name="a detection of two reflectors tells a pose as surely as one of one",
+        file=FOLDER + "trail_fit.py",
+        find="(work[r, 3] + dx * dx)",
+        replace="work[r, 3]",
+        tests=(LED,),
+    ),
+    Mutant(
+        name="a shiny thing speaks against a pose again and again",
+        file=FOLDER + "trail_fit.py",
+        find="max(strange[at, 2], LEAST_OF_ONE)",
+        replace="strange[at, 2]",
+        tests=(LED,),
+    ),
+    Mutant(
+        name="a pose that was found among things beside their places is as sure as any",
+        file=FOLDER + "trail_search.py",
+        find="+= found.misfit",
+        replace="+= 0.0",
+        tests=(TESTS + "test_trail.py::test_a_pose_found_among_things_beside_their_places_is_less_sure",),
+    ),
+    Mutant(
+        name="bearings that are off by what the supervisor allows stop the vehicle",
+        file=FOLDER + "lasting.py",
+        find="return not harmless and found > share * limit",
+        replace="return found > share * limit",
+        tests=(
+            TESTS + "test_bearings.py"
+            "::test_innovations_that_average_out_stop_nobody_and_those_that_are_harmless_neither",
+        ),
     ),
     Mutant(
         name="a beam that goes through a wall counts as one that ends at it",
