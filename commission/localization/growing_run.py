@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -176,6 +177,45 @@ class GrowingRun:
         self._localizer.release()
         return tuple(iter(self.pull, None))
 
+    def forget_before(self, cycle: int) -> tuple[FilterState, int] | None:
+        """Forget what was before the last checkpoint at or before a cycle; what was given out stays as it is.
+
+        Parameters
+        ----------
+        cycle : number of a cycle; from the checkpoint on, cycles count from 0.
+
+        Returns
+        -------
+        state, stamp_ns : state from which the rest goes on, and stamp of the newest cycle that is forgotten [ns]; None
+            where no checkpoint tells cycles apart by their stamps.
+        """
+        stamps = self._cycles.stamps_ns
+        usable = [c for c in self._checkpoints if 0 < c.cycle <= min(cycle, self._count - 1)]
+        usable = [c for c in usable if stamps[c.cycle] > stamps[c.cycle - 1]]
+        if not usable:
+            return None
+        first, state = usable[-1]
+        stamp_ns = int(stamps[first - 1])
+        rows, sightings = int(self._offsets[first]), int(self._tag_offsets[first])
+        reflexes = int(np.count_nonzero(self._cycles.is_reflex[:first]))
+        self._detections = DetectionRows._make(map(_later, self._detections, [rows] * len(self._detections)))
+        self._sightings = SightingRows._make(map(_later, self._sightings, [sightings] * len(self._sightings)))
+        self._reflexes = ReflexRows._make(map(_later, self._reflexes, [reflexes] * len(self._reflexes)))
+        self._ids, self._named = self._ids[sightings:], self._named[reflexes:]
+        self._cycles = Cycles._make(map(_later, self._cycles, [first] * len(self._cycles)))
+        self._offsets = _later(self._offsets, first) - rows
+        self._tag_offsets = _later(self._tag_offsets, first) - sightings
+        self._count -= first
+        self._checkpoints = [c._replace(cycle=c.cycle - first) for c in self._checkpoints if c.cycle >= first]
+        self._searches = [s._replace(cycle=s.cycle - first) for s in self._searches if s.cycle >= first]
+        before = [s for s in self._segments if s.first < first]
+        later = [replace(s, first=s.first - first) for s in self._segments if s.first >= first]
+        # Where one begins just there, it is the first one; else the one before goes on, its pose long thrown away.
+        self._segments = (
+            later if later and later[0].first == 0 else [replace(before[-1], first=0, locate=False), *later]
+        )
+        return state, stamp_ns
+
     def columns(self) -> RunColumns:
         """Return the run so far: views of rows that never change again."""
         n = self._count
@@ -296,6 +336,11 @@ class GrowingRun:
         found.d2[first:last] = estimate.d2
         self._offsets[row + 1] = last
         self._count = row + 1
+
+
+def _later(column: NDArray[Any], first: int) -> NDArray[Any]:
+    """Return a copy of the rows from `first` on, with the room that is left behind them."""
+    return column[first:].copy()
 
 
 def _longer(column: NDArray[Any], rows: int) -> NDArray[Any]:

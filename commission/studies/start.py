@@ -36,6 +36,7 @@ class StartOrigin(StrEnum):
     REFERENCE = "first reference pose"
     ROUTE = "start of the first route"
     DRIVE = "start of the virtual drive"
+    CONTINUED = "as it drove on from what is forgotten"
     SEARCH = "not told: searched by what is seen"
 
 
@@ -47,9 +48,13 @@ class Start:
     """Stamped with the first record."""
     origin: StartOrigin
     """Who says so."""
+    known: FilterState | None = None
+    """The whole state there, where a run goes on; None: what the belief says."""
 
     def state(self) -> FilterState:
         """Return the state of the localizer before the first record."""
+        if self.known is not None:
+            return self.known
         if self.origin is StartOrigin.SEARCH:
             return state_unlocated(int(self.belief.stamp_ns), from_belief(self.belief))
         return state_at_start(self.belief)

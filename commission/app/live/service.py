@@ -44,6 +44,8 @@ class LiveService(Service):
     def __init__(self, context: Context) -> None:
         super().__init__(context)
         self._runner: LiveRunner | None = None
+        # Not the run itself: what was left may be remembered for long.
+        self._drive = object()
         # Written by the runner's thread, read by the owner's: the newest one wins.
         self._latest: LiveSnapshot | None = None
         self._shown: LiveSnapshot | None = None
@@ -94,6 +96,7 @@ class LiveService(Service):
             # One file for all connections: numbers of messages go on.
             self._states = StateStream(wanted, state.project.name)
         run = LiveRun(state.project, effect.start)
+        self._drive = object()
         runner = LiveRunner(session, run, self._publish, states=self._states)
         runner.start()
         self._own = own_addresses()
@@ -156,7 +159,9 @@ class LiveService(Service):
         """Tell of the run so far, where there is one."""
         run = snapshot.run
         if run.result is not None and run.belief is not None:
-            self.context.post(RunGrew(run.result, run.belief, run.mode, is_over))
+            self.context.post(
+                RunGrew(result=run.result, belief=run.belief, mode=run.mode, is_over=is_over, of=self._drive)
+            )
 
     def rest(self, state: AppState) -> float:  # noqa: ARG002 - the service's
         """Return the time until something is due again [s]."""
@@ -172,6 +177,9 @@ class LiveService(Service):
             for each in shown.sources
         )
         told = tuple(f"{count} {words}" for words, count in shown.told.items())
+        if shown.run.forgotten_s:
+            gone = f"the first {shown.run.forgotten_s / 3600.0:.1f} h are not on the page any more"
+            told = (*told, f"{gone}, which keeps the newest hour or two; a recording that is made holds all")
         recording = None if self._recorder is None else self._recorder.status()
         return (LiveView(sources=sources, told=told, recording=recording, account=shown.account, clocks=shown.clocks),)
 

@@ -94,7 +94,9 @@ class Playback:
         """Show more of the same drive; a cursor at its end goes along."""
         was_at_end = self.at_end
         self.replace(result)
-        self.end_ns = result.inputs.log.last_ns
+        # A live run of hours forgets where it began.
+        self.start_ns, self.end_ns = result.inputs.log.first_ns, result.inputs.log.last_ns
+        self._at_ns = max(self._at_ns, self.start_ns)
         if was_at_end:
             self._at_ns = self.end_ns
 

@@ -50,7 +50,6 @@ from commission.site.project import Project
 from commission.site.record_log import RecordLog
 from commission.studies import curves, run
 from commission.studies.run import RunInput, RunResult, judged_run
-from commission.studies.start import Start
 
 PREPARE, COMPILE, LOCALIZE = "Preparing the drive", "Getting ready", "Localizing"
 DRIVE_AGAIN = "Driving again in the changed hall"
@@ -127,7 +126,7 @@ class RunService(Service):
         self._again: RecordLog | None = None
         # The live run that is on the page, and the start of the one that something else was chosen instead of.
         self._live: RunGrew | None = None
-        self._left: Start | None = None
+        self._left: object = None
 
     def start(self) -> None:
         """Compile, and load what the page begins with."""
@@ -272,11 +271,12 @@ class RunService(Service):
 
     def _show_grown(self, grown: RunGrew) -> None:
         """Show a live run as far as it has come; one that is over is a run as any other."""
-        start = grown.result.inputs.start
-        if start is self._left:
+        if grown.which is self._left:
             return
-        playback = self.playback
-        if playback is None or playback.result.inputs.start is not start:
+        playback, live = self.playback, self._live
+        # A long one goes on from a later start than that which is shown.
+        known = live.result if live is not None and live.which is grown.which else grown.result
+        if playback is None or playback.result.inputs.start is not known.inputs.start:
             self._jobs.cancel(DRIVE_AGAIN)
             self._jobs.cancel(LOCALIZE)
             self._source = self._world = self._coming = None
@@ -298,7 +298,7 @@ class RunService(Service):
         """Localize a new drive; the run before stays on the page until that is done."""
         self._jobs.cancel(DRIVE_AGAIN)
         if self._live is not None:
-            self._left, self._live = self._live.result.inputs.start, None
+            self._left, self._live = self._live.which, None
         self._source, self._world, self._told, self._coming = source, world, (), None
         self._localize(RunInput.of(self._project, drive.log, drive.start))
         return SourceLoaded(source)

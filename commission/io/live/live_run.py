@@ -36,6 +36,9 @@ UNKNOWN_TURN = 0.5
 """The same of its turning [rad/s]."""
 NOTHING_HEARD_NS = 200_000_000
 """Time without odometry from which on the vehicle may be anywhere that it can have driven to [ns]."""
+HELD_CYCLES = 180_000
+"""Cycles that a live run holds at most, of which it then forgets the older half: one to two hours at 25 scans per
+second, 0.4 to 0.6 GB. A page is left open for days, and judging a run takes as long as the run is."""
 FIRST_ROWS = 1_024
 
 
@@ -49,6 +52,8 @@ class LiveResult:
     """What is known of the pose by the newest odometry; None before the first record."""
     mode: Mode
     """State of the supervisor."""
+    forgotten_s: float = 0.0
+    """Time of the drive that is not held any more, before the run so far [s]."""
 
 
 class LiveRun:
@@ -60,11 +65,17 @@ class LiveRun:
     pose : (3,) pose of base at the first record [m, m, rad], map frame; None: the start of the first route, and where
         the project has none, the vehicle looks where it is.
     sigmas : (3,) 1-sigma of it [m, m, rad]; None: the usual ones.
+    held : cycles that it holds at most.
     """
 
     def __init__(
-        self, project: Project, pose: Sequence[float] | None = None, sigmas: Sequence[float] | None = None
+        self,
+        project: Project,
+        pose: Sequence[float] | None = None,
+        sigmas: Sequence[float] | None = None,
+        held: int = HELD_CYCLES,
     ) -> None:
+        self._held, self._try_at, self._began_ns, self._forgotten_ns = held, held, 0, 0
         self._origin = StartOrigin.ROUTE if pose is None else StartOrigin.GIVEN
         if pose is None:
             pose = route_start(project.routes[0]) if project.routes else None
@@ -85,6 +96,7 @@ class LiveRun:
         self._reflexes: list[Reflex] = []
         self._newest_ns = self._odometry_ns = 0
         self._spent = 0.0
+        self._cycles = 0
 
     @property
     def scanner_names(self) -> tuple[str, ...]:
@@ -109,7 +121,10 @@ class LiveRun:
             # No estimate depends on a reference, and one may come when later records have been taken.
             estimates = () if isinstance(record, ReferencePose) else run.feed(record)
             self._spent += time.perf_counter() - before
+            self._cycles += len(estimates)
             self._keep(record)
+            if len(run) >= self._try_at:
+                self._forget(run)
             return estimates
 
     def belief_before(self, record: Record) -> Belief | None:
@@ -129,7 +144,9 @@ class LiveRun:
     def end(self) -> tuple[Estimate, ...]:
         """Process what waits, since no more comes; returns the estimates that follow."""
         with self._lock:
-            return () if self._run is None else self._run.flush()
+            last = () if self._run is None else self._run.flush()
+            self._cycles += len(last)
+            return last
 
     def use(self, project: Project) -> None:
         """Localize with another project's reflectors and parameters from the next record on."""
@@ -159,16 +176,18 @@ class LiveRun:
             run, start = self._run, self._start
             if run is None or start is None:
                 return LiveResult(None, None, Mode.OPERATIONAL)
-            belief, mode = belief_of(run.state), Mode(run.state.mode)
+            belief, mode, forgotten_s = belief_of(run.state), Mode(run.state.mode), self._forgotten_ns * 1e-9
             columns = run.columns() if len(run) and judged is None else None
             log, spent = (self._log() if columns is not None else None), self._spent
+            cycles = max(self._cycles, 1)
         silent_ns = 0 if now_ns is None else now_ns - max(self._odometry_ns, belief.stamp_ns)
         if silent_ns > NOTHING_HEARD_NS:
             belief = self.grown(belief, silent_ns * 1e-9)
         if columns is None or log is None:
-            return LiveResult(judged, belief, mode)
+            return LiveResult(judged, belief, mode, forgotten_s)
         inputs = RunInput(log=log, start=start, segments=columns.segments)
-        return LiveResult(judge(inputs, columns, spent * 1e6 / len(columns)), belief, mode)
+        result = judge(inputs, columns, spent * 1e6 / cycles)
+        return LiveResult(result, belief, mode, forgotten_s)
 
     def grown(self, belief: Belief, seconds: float) -> Belief:
         """Return a belief after a time in which nothing was heard: 2-sigma is as far as the vehicle can have driven.
@@ -185,6 +204,7 @@ class LiveRun:
     def _begun(self, record: Record) -> GrowingRun:
         """Return the run that begins with a record."""
         self._start = self._start_at(record.stamp_ns)
+        self._began_ns = record.stamp_ns
         return GrowingRun(self._setup, self._start.state())
 
     def _start_at(self, stamp_ns: int) -> Start:
@@ -192,6 +212,22 @@ class LiveRun:
         if self._pose is None:
             return unknown_start_at(stamp_ns, self._setup.reflectors.centers)
         return Start(belief_at(stamp_ns, self._pose, self._sigmas), self._origin)
+
+    def _forget(self, run: GrowingRun) -> None:
+        """Forget the older half; the rest is a run that goes on from the state there."""
+        found = run.forget_before(self._held // 2)
+        self._try_at = max(self._held, len(run) + self._held // 8)
+        if found is None:
+            return
+        state, stamp_ns = found
+        self._start = Start(belief_of(state), StartOrigin.CONTINUED, state)
+        for rows in (self._odometry, self._reference, self._detections, self._seen):
+            rows.forget_until(stamp_ns)
+        for spool in self._spools.values():
+            spool.forget_until(stamp_ns)
+        self._tags = [each for each in self._tags if each.stamp_ns > stamp_ns]
+        self._reflexes = [each for each in self._reflexes if each.stamp_ns > stamp_ns]
+        self._forgotten_ns = stamp_ns - self._began_ns
 
     def _keep(self, record: Record) -> None:
         """Remember a record: small ones in memory, scans in a file."""
@@ -257,3 +293,11 @@ class _StampedRows:
         self._stamps[self._count : last] = stamp_ns
         self._values[self._count : last] = rows
         self._count = last
+
+    def forget_until(self, stamp_ns: int) -> None:
+        """Forget the rows up to a stamp [ns]; a reference may have come late, and stands behind newer ones."""
+        stays = self._stamps[: self._count] > stamp_ns
+        # Room as at first behind them.
+        self._stamps = np.concatenate([self._stamps[: self._count][stays], np.empty(FIRST_ROWS, np.int64)])
+        self._values = np.concatenate([self._values[: self._count][stays], np.empty_like(self._values[:FIRST_ROWS])])
+        self._count = int(np.count_nonzero(stays))

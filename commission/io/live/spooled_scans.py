@@ -9,6 +9,7 @@ import os
 import tempfile
 import weakref
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +39,7 @@ class SpooledScans:
         self._number = file.fileno()
         # It lives as long as a result that can ask for a scan.
         weakref.finalize(self, file.close)
-        self._count = 0
+        self._count = self._forgotten = 0
         self._slot = self._slots = 0
         self._first: Scan | None = None
         self._stamps = np.empty(FIRST_ROWS, np.int64)
@@ -56,7 +57,7 @@ class SpooledScans:
             self._stamps = np.concatenate([self._stamps, np.empty_like(self._stamps)])
             self._angles = np.concatenate([self._angles, np.empty_like(self._angles)])
             self._beams = np.concatenate([self._beams, np.empty_like(self._beams)])
-        os.pwrite(self._number, _bytes_of(scan, self._first), row % self._slots * self._slot)
+        os.pwrite(self._number, _bytes_of(scan, self._first), (self._forgotten + row) % self._slots * self._slot)
         self._stamps[row] = scan.stamp_ns
         self._angles[row] = scan.angle_min, scan.angle_increment
         self._beams[row] = min(len(scan.ranges), len(self._first.ranges))
@@ -65,14 +66,22 @@ class SpooledScans:
     def so_far(self) -> ScansSoFar:
         """Return what is there now: rows that never change again, though old ones may be forgotten."""
         n = self._count
-        return ScansSoFar(self, self._stamps[:n], self._angles[:n], self._beams[:n])
+        return ScansSoFar(self, self._forgotten, self._stamps[:n], self._angles[:n], self._beams[:n])
+
+    def forget_until(self, stamp_ns: int) -> None:
+        """Forget the scans up to a stamp [ns]; what was given out still has them, as long as the file does."""
+        gone = int(np.searchsorted(self._stamps[: self._count], stamp_ns, side="right"))
+        self._stamps = _later(self._stamps, gone, self._count)
+        self._angles = _later(self._angles, gone, self._count)
+        self._beams = _later(self._beams, gone, self._count)
+        self._forgotten, self._count = self._forgotten + gone, self._count - gone
 
     def read(self, index: int, angles: FloatArray, beams: int, stamp_ns: int) -> Scan:
         """Return one scan; all its beams came back from nothing where it is forgotten.
 
         Parameters
         ----------
-        index : its number.
+        index : its number among all that were ever written.
         angles : (2,) first bearing and step [rad].
         beams : how many it has.
         stamp_ns : its stamp [ns].
@@ -81,7 +90,7 @@ class SpooledScans:
         if first is None:
             raise IndexError("no scan was written")
         width = len(first.ranges)
-        if index < self._count - self._slots:
+        if index < self._forgotten + self._count - self._slots:
             content = np.full(width, np.nan, np.float32).tobytes().ljust(self._slot, b"\0")
         else:
             content = os.pread(self._number, self._slot, index % self._slots * self._slot)
@@ -110,13 +119,16 @@ class ScansSoFar:
     Parameters
     ----------
     spool : the file.
+    first : number of the first of them among all that were ever written.
     stamps_ns : (K,) [ns].
     angles : (K, 2) first bearing and step [rad].
     beams : (K,) number of beams.
     """
 
-    def __init__(self, spool: SpooledScans, stamps_ns: IntArray, angles: FloatArray, beams: IntArray) -> None:
-        self._spool, self._angles = spool, angles
+    def __init__(
+        self, spool: SpooledScans, first: int, stamps_ns: IntArray, angles: FloatArray, beams: IntArray
+    ) -> None:
+        self._spool, self._first, self._angles = spool, first, angles
         self.stamps_ns, self.beams = stamps_ns, beams
 
     def __len__(self) -> int:
@@ -148,12 +160,19 @@ class ScansSoFar:
 
     def scan(self, index: int) -> Scan:
         """Return one scan."""
-        return self._spool.read(index, self._angles[index], int(self.beams[index]), int(self.stamps_ns[index]))
+        return self._spool.read(
+            self._first + index, self._angles[index], int(self.beams[index]), int(self.stamps_ns[index])
+        )
 
     def _gathered(self, indices: Sequence[int]) -> ScanLog:
         if not len(indices):
             return ScanLog.even(np.empty(0, np.int64), np.empty((0, 0), np.float32), (0.0, 0.0))
         return stacked([self.scan(index) for index in indices])
+
+
+def _later(column: NDArray[Any], gone: int, count: int) -> NDArray[Any]:
+    """Return a copy of the rows that stay, with room behind them."""
+    return np.concatenate([column[gone:count], np.empty_like(column[:FIRST_ROWS])])
 
 
 def _bytes_of(scan: Scan, first: Scan) -> bytes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import socket
 import threading
 import time
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 
 from commission.app.base.state import AppState
+from commission.app.live import service
 from commission.app.live.actions import Connect, Disconnect, Record
 from commission.app.live.effects import OpenSources
 from commission.app.live.live_panel import account_html, live_table, start_pose
@@ -20,17 +22,19 @@ from commission.app.live.service import LiveService
 from commission.app.live.state import LiveState
 from commission.app.live.view import LiveView, SourceView
 from commission.app.run.actions import ChooseSource, RecordedDrive, Seek
+from commission.app.run.playback import Playback
 from commission.app.run.service import RunService
 from commission.app.run.state import RunState
 from commission.app.tune.actions import SetParameter
 from commission.errors import CommissionError, UsageError
 from commission.io.live.accounts import RecordAccount
 from commission.io.live.checklist import checklist
+from commission.io.live.live_run import LiveRun
 from commission.io.live.permission import Permission
 from commission.io.live.registry import SourceAddress
 from commission.io.live.status import SourceState, SourceStatus
 from commission.io.live.virtual_vehicle import send_drive
-from commission.localization import localizer
+from commission.localization import growing_run, localizer
 from commission.simulation.scenario import records
 from commission.site.records import Odometry
 from commission.studies import run
@@ -58,6 +62,10 @@ def served() -> Iterator[Served]:
 def live_of(served: Served) -> LiveView:
     parts = served.runtime.service(LiveService).parts(slowly=True)
     return parts[0] if parts else LiveView(sources=(), told=())  # type: ignore[return-value]
+
+
+def playback_of(served: Served) -> Playback | None:
+    return served.runtime.service(RunService).playback
 
 
 def connected(served: Served, *kinds: str) -> list[SourceAddress]:
@@ -105,6 +113,28 @@ def test_a_vehicle_that_drives_now_is_shown_grows_and_stays_as_a_run_that_can_be
     assert replayed.columns.means.tobytes() == over.result.columns.means.tobytes()
     served.runtime.post(SetParameter("association.gate_probability", 0.6))
     served.until(lambda: served.view is not None and served.view.result is not over.result)
+
+
+def test_a_drive_that_is_longer_than_the_page_holds_goes_on_and_says_what_is_gone(
+    served: Served, drive: list[object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(growing_run, "CHECKPOINT_CYCLES", 8)
+    monkeypatch.setattr(service, "LiveRun", functools.partial(LiveRun, held=32))
+    sender = sending(drive, connected(served, "sick-safety", "json"), speed=4.0)
+    served.until(lambda: any("not on the page any more" in line for line in live_of(served).told))
+    # Only the owner may ask for a view while the run goes on from a later start.
+    served.until(lambda: (playing := playback_of(served)) is not None and playing.result.inputs.start.known is not None)
+    playing = playback_of(served)
+    assert playing is not None
+    assert (playing.at_end, playing.result.cycles < 33) == (True, True)
+    first_ns = playing.start_ns
+    sender.join()
+    served.runtime.post(Disconnect())
+    served.until(lambda: served.runtime.service(RunService)._live is None)
+    over = served.view
+    assert over is not None
+    assert over.result.columns.stamps_ns[0] > first_ns
+    assert judged_run(over.result.inputs).columns.means.tobytes() == over.result.columns.means.tobytes()
 
 
 def test_what_drives_now_is_recorded_and_opens_as_the_same_run(

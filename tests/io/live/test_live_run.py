@@ -31,6 +31,7 @@ from commission.io.project_file import load_project
 from commission.io.recordings.base import load_log
 from commission.io.recordings.csv_writer import write_recording
 from commission.io.vda5050_states import StateFile, StateStream, StateVersion, state_messages
+from commission.localization import growing_run
 from commission.localization.estimate import Estimate, Mode
 from commission.simulation.scenario import records
 from commission.site.project import Project
@@ -282,6 +283,28 @@ def test_detections_that_a_sensor_reports_are_kept_too(warehouse: Project) -> No
     assert found is not None
     assert len(found.columns) == 50
     assert_same_run(found, judged_run(found.inputs))
+
+
+def test_a_run_of_days_holds_the_newest_part_of_itself_and_goes_on_as_if_it_held_all(
+    warehouse: Project, drive: list[Record], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(growing_run, "CHECKPOINT_CYCLES", 16)
+    whole, short = LiveRun(warehouse), LiveRun(warehouse, held=64)
+    for record in drive:
+        whole.take(record)
+        short.take(record)
+    every, kept = whole.so_far(), short.so_far()
+    assert every.result is not None
+    assert kept.result is not None
+    count = len(kept.result.columns)
+    assert 16 <= count < 64 < len(every.result.columns)
+    np.testing.assert_array_equal(kept.result.columns.means, every.result.columns.means[-count:])
+    first_s = (kept.result.columns.stamps_ns[0] - drive[0].stamp_ns) * 1e-9
+    assert kept.forgotten_s == pytest.approx(first_s, abs=0.05)
+    # It is a run as any other: localized again it is the same, and its scans are there.
+    assert_same_run(kept.result, judged_run(kept.result.inputs))
+    ends = (each.result.inputs.log.scans[0] for each in (kept, every) if each.result is not None)
+    np.testing.assert_array_equal(*(store.scan(len(store) - 1).ranges for store in ends))
 
 
 def test_scans_are_read_back_from_their_file_and_the_oldest_forgotten() -> None:
