@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from commission.compiled import compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray
-from commission.localization.association import INLIER, OUTLIER_ASSOCIATION
+from commission.localization.association import INLIER, NOBODY, OUTLIER_ASSOCIATION
+from commission.localization.displacement import NO_PAIRS, tell_of_a_displacement, with_pair
 from commission.localization.observation import ObservationModel, scanner_offset
 from commission.localization.pose_gaussian import PoseGaussian, position_variance
 from commission.localization.reflector_index import Cells, nearest_entry
@@ -146,22 +147,32 @@ def weigh(  # noqa: PLR0917 - the scan's detections and the map, array by array
     rejected near reflectors does, so that many of those still make the vehicle lost. A match counts as three accepted
     detections, and as one where the pose has to prove right. One that tells a part of the pose proves nothing; it
     takes back one scan that spoke against the pose.
+
+    What an error explains that the supervisor allows does not count, unless all that is rejected near reflectors tells
+    together of one that it does not allow: `tell_of_a_displacement`.
     """
-    accepted, rejected, near = 0.0, 0.0, 0.0
+    accepted, rejected, near, excused, pairs = 0.0, 0.0, 0.0, 0.0, NO_PAIRS
+    offset_x, offset_y = scanner_offset(belief.theta, model)
     for i in range(first, last):
         if status[i] == INLIER:
             accepted += 1.0
         elif status[i] == OUTLIER_ASSOCIATION:
             direction = belief.theta + model.mount_theta + detections[i, 1]
             measured = detections[i, 0] - model.range_bias
-            offset_x, offset_y = scanner_offset(belief.theta, model)
-            x = belief.x + offset_x + measured * math.cos(direction)
-            y = belief.y + offset_y + measured * math.sin(direction)
-            reach = rule.reach + rule.turn * measured
-            distance = nearest(x, y, reach, cells, places, cell_offsets)
+            qx = offset_x + measured * math.cos(direction)
+            qy = offset_y + measured * math.sin(direction)
+            x, y, reach = belief.x + qx, belief.y + qy, rule.reach + rule.turn * measured
+            entry, distance = nearest(x, y, reach, cells, places, cell_offsets)
             if distance > rule.harmless + rule.harmless_turn * measured:
                 rejected += 1.0
-                near += 1.0 if distance <= reach else 0.0
+                near += 1.0 if entry != NOBODY else 0.0
+            else:
+                excused += 1.0
+            if entry != NOBODY:
+                variance = model.range_variance + measured * measured * model.bearing_variance + places[entry, 2]
+                pairs = with_pair(pairs, qx, qy, places[entry, 0] - x, places[entry, 1] - y, variance)
+    if excused > 0.0 and tell_of_a_displacement(pairs, rule.harmless, rule.harmless_turn):
+        rejected, near = rejected + excused, near + excused
     confirmed, against = evidence.confirmed, evidence.against
     doubtful = is_doubtful(belief, rule)
     matches = contours == 1.0 and not doubtful
@@ -242,8 +253,8 @@ def is_doubtful(prior: PoseGaussian, rule: RejectionRule) -> bool:
 @compiled_inline
 def nearest(  # noqa: PLR0917 - a place and the map, array by array
     x: float, y: float, reach: float, cells: Cells, places: FloatArray, cell_offsets: IntArray
-) -> float:
-    """Distance from a place to the nearest reflector of the map [m]; infinite where none is within reach.
+) -> tuple[int, float]:
+    """Row of the reflector that is nearest to a place, and its distance [m]; NOBODY and inf where none is in reach.
 
     Parameters
     ----------
@@ -258,7 +269,7 @@ def nearest(  # noqa: PLR0917 - a place and the map, array by array
     # A little farther, so that what is exactly at `reach` is decided by its distance and not by its rounded square.
     entry, square = nearest_entry(x, y, reach * (1.0 + 1e-9), cells, places, cell_offsets)
     distance = math.sqrt(square)
-    return distance if entry >= 0 and distance <= reach else math.inf
+    return (entry, distance) if entry >= 0 and distance <= reach else (NOBODY, math.inf)
 
 
 @compiled_inline

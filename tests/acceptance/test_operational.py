@@ -34,7 +34,8 @@ from tests.conftest import Seeds, few_of
 SITES = ("laboratory", "shop_floor", "warehouse")
 ELSEWHERE = (("laboratory", 1), ("shop_floor", 2), ("warehouse", 3))
 PEOPLE = 50
-SLIPS_DEG = (2, 3, 5, 8)
+SLIPS = (*((degrees, 0.0) for degrees in (2, 3, 5, 8)), (0, 0.12), (0, 0.2), (0, 0.3))
+"""Turn [degrees] and way ahead [m] that odometry tells and that did not happen."""
 LONGEST = 15
 """Cycles that a vehicle may be dangerous and operational."""
 
@@ -57,12 +58,13 @@ class Drive:
         errors = pose_errors(run.means, references)
         return run, (np.hypot(errors[:, 0], errors[:, 1]) > 0.1) | (np.abs(errors[:, 2]) > math.radians(3.0))
 
-    def slipped(self, degrees: int, seed: int) -> RecordLog:
-        """The same records with a turn in the odometry that did not happen, somewhere in the middle of the drive."""
+    def slipped(self, degrees: int, ahead: float, seed: int) -> RecordLog:
+        """The same records with a motion in the odometry that did not happen, somewhere in the middle of the drive."""
         rng = np.random.default_rng(1000 * seed + degrees)
         displacements = np.array(self.log.displacements)
         row = int(rng.uniform(0.3, 0.7) * len(displacements))
         displacements[row, 2] += math.radians(degrees) * rng.choice((-1, 1))
+        displacements[row, 0] += ahead
         return replace(self.log, displacements=displacements)
 
 
@@ -87,19 +89,21 @@ def drive(project: Project, people: int, seed: int) -> Drive:
     return Drive(setup, log, extract_detections(log, setup), Belief(0, start.pose, np.diag(start.sigmas**2)))
 
 
-def unnoticed(project: Project, people: int, seed: int, *, in_sight: bool = False) -> dict[tuple[int, int, int], int]:
+def unnoticed(
+    project: Project, people: int, seed: int, *, in_sight: bool = False
+) -> dict[tuple[int, int, int, float], int]:
     """Cycles that each slip is dangerous in while the vehicle is operational, where they are too many.
 
     With `in_sight` only those in which anything is detected: nothing says that a blind vehicle has slipped.
     """
     driven = drive(project, people, seed)
-    found: dict[tuple[int, int, int], int] = {}
-    for degrees in SLIPS_DEG:
-        run, dangerous = driven.localized(driven.slipped(degrees, seed))
+    found: dict[tuple[int, int, int, float], int] = {}
+    for degrees, ahead in SLIPS:
+        run, dangerous = driven.localized(driven.slipped(degrees, ahead, seed))
         said = dangerous & (run.modes == Mode.OPERATIONAL)
         if in_sight:
             said &= run.counts(Status.INLIER) + run.counts(Status.OUTLIER_ASSOCIATION) > 0
-        found[people, seed, degrees] = int(np.count_nonzero(said))
+        found[people, seed, degrees, ahead] = int(np.count_nonzero(said))
     return {slip: cycles for slip, cycles in found.items() if cycles > LONGEST}
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from commission.geometry.angles import difference
-from commission.localization.estimate import Belief, Mode
+from commission.localization.estimate import Belief, Mode, Status
 from commission.localization.localizer import Localizer
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.reflector_index import build_index
@@ -19,6 +19,7 @@ from commission.localization.rejection import (
     Evidence,
     RejectionRule,
     nearest,
+    rejection_rule,
     rejects_the_world,
     weigh,
 )
@@ -134,6 +135,32 @@ def test_where_contours_match_only_what_is_rejected_near_reflectors_counts() -> 
     assert weighed(0, 0, contours=0.5, variance=100.0).against == 4.0
     doubtful = weighed(0, 4, contours=1.0, variance=100.0)
     assert (doubtful.accepted, doubtful.rejected, doubtful.confirmed, doubtful.against) == (0.0, 4.0, 0.0, 5.0)
+
+
+@pytest.mark.parametrize(
+    ("ahead", "counted"),
+    [
+        (0.03, 0.0),  # the limits allow as much
+        (0.15, 3.0),
+    ],
+)
+def test_several_that_tell_of_one_displacement_count_though_each_is_harmless(ahead: float, counted: float) -> None:
+    places = np.array([(9.0, 1.0), (8.0, -6.0), (-9.0, 4.0)])
+    reflectors = tuple(Reflector(id=f"R{i}", x=x, y=y) for i, (x, y) in enumerate(places.tolist()))
+    setup = LocalizerSetup(reflectors=ReflectorMap(reflectors), scanners=(Scanner(),), parameters=Parameters())
+    seen = places - (ahead, 0.0)
+    detections = np.column_stack((np.hypot(*seen.T), np.arctan2(seen[:, 1], seen[:, 0])))
+    # A turn that is harmless moves each of them as far.
+    assert (0.04 + math.radians(1.2) * detections[:, 0] > ahead).all()
+    belief = PoseGaussian(0.0, 0.0, 0.0, 1e-6, 0.0, 0.0, 1e-6, 0.0, 1e-6)
+    index, rule = setup.index, rejection_rule(SupervisorParameters())
+    for rows, expected in (((0, 3), counted), ((0, 1), 0.0)):
+        status = np.full(3, int(Status.OUTLIER_ASSOCIATION), dtype=np.int8)
+        map_rows = (index.cells, index.places, index.offsets)
+        after = weigh(
+            NO_EVIDENCE, SECOND, belief, *rows, detections, setup.observations[0], *map_rows, status, 0.0, rule
+        )
+        assert (after.rejected, after.near_rejected) == (expected, expected)
 
 
 def weighed(
@@ -326,11 +353,11 @@ def test_the_nearest_reflector_is_that_of_brute_force_and_none_beyond_reach() ->
         away = min(math.dist((x, y), center) for center in reflectors.centers)
         # Distances of brute force are rounded otherwise in the last bits.
         for reach, found in ((away * (1.0 + 1e-14), away), (away * (1.0 - 1e-14), math.inf), (away + 1.0, away)):
-            got = nearest(x, y, reach, index.cells, index.places, index.offsets)
+            _, got = nearest(x, y, reach, index.cells, index.places, index.offsets)
             assert got == pytest.approx(found, rel=1e-14)
 
 
 def test_a_reflector_exactly_at_reach_is_near() -> None:
     index = build_index(ReflectorMap((Reflector(id="A", x=3.0, y=4.0),)))
     for reach, found in ((5.0, 5.0), (math.nextafter(5.0, 0.0), math.inf)):
-        assert nearest(0.0, 0.0, reach, index.cells, index.places, index.offsets) == found
+        assert nearest(0.0, 0.0, reach, index.cells, index.places, index.offsets)[1] == found

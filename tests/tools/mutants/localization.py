@@ -419,6 +419,20 @@ LOCALIZATION = (
         tests=(TESTS + "test_rejection.py::test_a_scan_speaks_against_the_pose_by_what_it_rejects",),
     ),
     Mutant(
+        name="each rejected detection is excused alone, whatever several tell together",
+        file=FOLDER + "rejection.py",
+        find="rejected, near = rejected + excused, near + excused",
+        replace="rejected, near = rejected, near",
+        tests=(TESTS + "test_rejection.py::test_several_that_tell_of_one_displacement_count_though_each_is_harmless",),
+    ),
+    Mutant(
+        name="a displacement that turns the other way",
+        file=FOLDER + "displacement.py",
+        find="pairs.turn + w * (qx * ey - qy * ex)",
+        replace="pairs.turn + w * (qy * ex - qx * ey)",
+        tests=(TESTS + "test_displacement.py::test_it_is_least_squares_with_a_prior",),
+    ),
+    Mutant(
         name="lost by one scan too many against the pose",
         file=FOLDER + "rejection.py",
         find="evidence.against >= rule.scans_against",
