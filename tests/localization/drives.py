@@ -131,6 +131,7 @@ def detections(pose: FloatArray, setup: LocalizerSetup, rng: np.random.Generator
     seen = expected[expected[:, 0] < plan.reach]
     sigma = [math.sqrt(model.range_variance), math.sqrt(model.bearing_variance)]
     seen = seen + rng.normal(size=seen.shape) * sigma + [model.range_bias, 0.0]
+    seen = seen[seen[:, 0] > 0.0]  # of a reflector that the scanner has driven into, noise would make a range below 0
     false = rng.uniform([0.5, -math.pi], [plan.reach, math.pi], (rng.poisson(plan.clutter), 2))
     return rng.permutation(np.concatenate([seen, false]))
 
