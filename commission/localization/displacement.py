@@ -84,8 +84,8 @@ def tell_of_a_displacement(pairs: Pairs, harmless: float, harmless_turn: float) 
     Notes
     -----
     min over d, t of sum w |e - d - t R q|^2 + |d|^2 / harmless^2 + t^2 / harmless_turn^2, R the turn by 90 degrees:
-    least squares with a prior, linear in a small t, derived from its normal equations. Explained where the first part is
-    at most 9 (2 n - 3), by the noise; harmless where the others are at most 1, by definition.
+    least squares with a prior, linear in a small t, derived from its normal equations. Explained where the first part
+    is at most 9 (2 n - 3), by the noise; harmless where the others are at most 1, by definition.
     """
     if pairs.number < FEWEST_PAIRS or not (harmless > 0.0 and harmless_turn > 0.0):
         return False
