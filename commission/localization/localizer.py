@@ -438,7 +438,7 @@ class Localizer:
         """Go on searching after a scan or a frame; a tag tells at once."""
         if tags is not None and tags.figures is not None:
             ids = np.array(tags.ids, dtype=np.str_)
-            told = told_by_tags(after, self._setup, tags.sightings, ids, tags.figures)
+            told = told_by_tags((before, after), self._setup, tags.sightings, ids, tags.figures)
             if told is not None:
                 return told
         if self._map is None:

@@ -154,7 +154,7 @@ def sought(before: FilterState, after: FilterState, scan: SeenScan, around: Sear
         search = explained_again(search, None if before.mode == Mode.INITIALIZING else after.belief, now_ns, around)
         best = _confirmed(search)
         if best is not None:
-            return _located(after, search, best, now_ns)
+            return _located(before, after, search, best)
     if before.mode == Mode.INITIALIZING:
         return after._replace(belief=spread(search, around), search=search)
     # What its own detections make of it is no confirmation: they may fit wrong reflectors.
@@ -180,14 +180,16 @@ def _confirmed(search: Search) -> FloatArray | None:
     return None
 
 
-def _located(after: FilterState, search: Search, best: FloatArray, stamp_ns: int) -> FilterState:
+def _located(before: FilterState, after: FilterState, search: Search, best: FloatArray) -> FilterState:
     """Return the state of a filter that begins anew where the vehicle was found; the supervisor still withholds it."""
-    belief = gaussian_of(best, search.track)
+    belief, stamp_ns = gaussian_of(best, search.track), after.belief_ns
     return after._replace(
         belief=belief,
-        belief_ns=stamp_ns,
         mode=int(Mode.FAIL),
         evidence=NO_EVIDENCE._replace(stamp_ns=stamp_ns, confirmed=0.0),
+        # The filter may have believed its detections in this very scan.
+        output=before.output,
+        output_ns=before.output_ns,
         pivot=(belief.x, belief.y),
         cross=None,
         temporary=None,

@@ -293,7 +293,7 @@ def _found(  # noqa: PLR0917 - a cycle and what is known around it
     before, after = states
     tags = cycle.detected.tags
     if tags is not None and tags.is_frame[0]:
-        told = told_by_tags(after, setup, tags.sightings, tags.ids, cycle.columns.tags)
+        told = told_by_tags(states, setup, tags.sightings, tags.ids, cycle.columns.tags)
         if told is not None:
             return told
     return sought(before, after, _seen(log, setup, before, cycle, following), search)

@@ -34,19 +34,23 @@ from commission.site.tag_log import Ids
 
 
 def told_by_tags(
-    after: FilterState, setup: LocalizerSetup, sightings: FloatArray, ids: Ids, figures: FloatArray
+    states: tuple[FilterState, FilterState],
+    setup: LocalizerSetup,
+    sightings: FloatArray,
+    ids: Ids,
+    figures: FloatArray,
 ) -> FilterState | None:
     """Return the state of a filter that begins anew where a tag says; None where no id that the site has was read.
 
     Parameters
     ----------
-    after : state after the frame, as the filter has it.
+    states : before the frame, and after it as the filter has it.
     setup : tags, camera and what is known of both.
     sightings : (n, 6) of the frame, see `TagLog`.
     ids : (n,) of each.
     figures : (n, COLUMNS) out: the one that told; the others are not looked at.
     """
-    model = setup.tag_model
+    model, (before, after) = setup.tag_model, states
     if model is None:
         return None
     entries: IntArray = entries_of(ids, setup.tags)
@@ -71,6 +75,9 @@ def told_by_tags(
         belief=belief,
         mode=int(Mode.FAIL),
         evidence=NO_EVIDENCE._replace(stamp_ns=after.belief_ns, confirmed=0.0),
+        # The filter may have believed its sightings in this very frame.
+        output=before.output,
+        output_ns=before.output_ns,
         pivot=(belief.x, belief.y),
         cross=cross,
         temporary=None,
