@@ -1,5 +1,5 @@
-// The floor as a map: the wheel zooms to the pointer, the middle button moves it, and its edge says where the pointer is
-// and how long things are.
+// The floor as a map: the wheel zooms to the pointer, the middle button or Space and a drag moves it, and its edge says
+// how long things are, how large they are drawn, where the pointer is, and what attracts what is placed there.
 (() => {
   if (window.commissionFloor) return; // the server sends this script again after each reconnection
   window.commissionFloor = true;
@@ -10,8 +10,8 @@
 
   const status = document.createElement("div");
   status.className = "c-status";
-  status.innerHTML = "<i class='c-ruler'></i><b class='c-length'></b><span class='c-place'></span>";
-  const [ruler, length, place] = status.children;
+  status.innerHTML = "<i class='c-ruler'></i><b class='c-length'></b><span class='c-zoom'></span><span class='c-place'></span><span></span>";
+  const [ruler, length, zoom, place, snap] = status.children;
   document.body.append(status);
 
   // Where a point of the window lies on the floor [m]; null beside the floor and where there is none.
@@ -38,6 +38,34 @@
     return metres >= 0.01 ? `${(metres * 100).toFixed(0)} cm` : `${(metres * 1000).toFixed(metres < 0.001 ? 1 : 0)} mm`;
   }
 
+  // Space held down: the left button moves the floor, and selects nothing.
+  let held = null; // what the left button does else, and whether the floor was dragged
+  window.commissionSpace = (isDown) => {
+    const { cameraControl, canvas } = viewer() ?? {};
+    const before = held;
+    if (isDown && !held && cameraControl) {
+      held = { left: cameraControl.mouseButtons.left, isUsed: false };
+      cameraControl.mouseButtons.left = TRUCK;
+      canvas.style.cursor = "grab";
+    } else if (!isDown && held) {
+      cameraControl.mouseButtons.left = held.left;
+      canvas.style.cursor = "";
+      held = null;
+    }
+    return before?.isUsed ?? false;
+  };
+  addEventListener("blur", () => window.commissionSpace(false));
+  addEventListener("pointerdown", (event) => {
+    const canvas = viewer()?.canvas;
+    if (!held || !event.isTrusted || event.button !== 0 || event.target !== canvas) return;
+    held.isUsed = true;
+    event.stopImmediatePropagation();
+    // As the middle button, with which nothing is selected.
+    const { clientX, clientY, pointerId, pointerType, isPrimary } = event;
+    const middle = { button: 1, buttons: 4, clientX, clientY, pointerId, pointerType, isPrimary };
+    canvas.dispatchEvent(new PointerEvent("pointerdown", { ...middle, bubbles: true, cancelable: true }));
+  }, true);
+
   let shown = "", pointer = null;
   function draw() {
     requestAnimationFrame(draw);
@@ -45,29 +73,32 @@
     if (!canvas || !camera || !nodeRefFromName?.[""] || !cameraControl) return;
     if (!cameraControl.dollyToCursor) cameraControl.dollyToCursor = true;
     if (cameraControl.mouseButtons.middle !== TRUCK) cameraControl.mouseButtons.middle = TRUCK;
-    const box = canvas.getBoundingClientRect();
-    const now = [box.left, box.bottom, box.width, camera.fov, ...camera.position.toArray(), pointer].join();
+    const box = canvas.getBoundingClientRect(), attracts = document.querySelector(".c-attracts")?.textContent ?? "";
+    const now = [box.left, box.bottom, box.width, camera.fov, ...camera.position.toArray(), pointer, attracts].join();
     if (now === shown) return;
     shown = now;
     const { style } = document.documentElement; // for the rail of tools on its left and the numbers of now on its right
     style.setProperty("--c-floor", `${box.left}px`);
     style.setProperty("--c-right", `${innerWidth - box.right}px`);
     status.style.left = `${box.left + 12}px`;
-    status.style.top = `${box.bottom - 30}px`;
+    status.style.bottom = `${innerHeight - box.bottom + 6}px`;
+    status.style.maxWidth = `${box.width - 64}px`; // beside it is the button of the theme
     const isPlan = camera.fov < FLAT_DEGREES;
-    ruler.hidden = length.hidden = !isPlan;
+    ruler.hidden = length.hidden = zoom.hidden = !isPlan;
     if (isPlan) {
       const x = box.left + box.width / 2, y = box.top + box.height / 2;
       const [here, there] = [onFloor(x, y), onFloor(x + 100, y)];
       if (!here || !there) return;
       const perPixel = Math.hypot(there[0] - here[0], there[1] - here[1]) / 100;
-      const metres = rounded(LONGEST_BAR_PX * perPixel);
+      const metres = rounded(Math.min(LONGEST_BAR_PX, box.width / 4) * perPixel);
       ruler.style.width = `${metres / perPixel}px`;
       length.textContent = written(metres);
+      zoom.textContent = `${(1 / perPixel).toPrecision(3).replace(/(\.\d*?)0+$/, "$1").replace(/\.$/, "")} px/m`;
     }
     const at = pointer && onFloor(...pointer);
     const [x0, y0] = window.commissionOrigin ?? [0, 0]; // of the scene, in the map (map_scene.py)
     place.textContent = at ? `x ${(x0 + at[0]).toFixed(3)}   y ${(y0 + at[1]).toFixed(3)} m` : "";
+    snap.textContent = attracts;
   }
   // Who has zoomed or moved the floor keeps what was zoomed to, though the page still builds up: told until it is heard.
   let isOdd = false;

@@ -1,5 +1,6 @@
-// Keys that viser's commands cannot have, or not everywhere: Space plays or pauses, "?" shows all commands with their
-// keys, arrows move what is selected and not the camera, Escape cancels wherever the focus is.
+// Keys that viser's commands cannot have, or not everywhere: Space plays or pauses where it is pressed alone (held down,
+// the floor is dragged by it: floor_view.js), "?" shows all commands with their keys, arrows move what is selected and
+// not the camera, Escape cancels wherever the focus is.
 (() => {
   if (window.commissionKeys) return; // the server sends this script again after each reconnection
   window.commissionKeys = true;
@@ -27,9 +28,14 @@
       // viser's commands listen where it is dispatched, its camera farther up.
       press(event.key, event.code, { shiftKey: event.shiftKey, bubbles: false });
     } else if (event.repeat) return;
-    else if (event.key === " ") press("p", "KeyP"); // the command "Play or pause"
+    else if (event.key === " ") window.commissionSpace?.(true);
     else if (event.key === "?") press("k", "KeyK", { ctrlKey: true }); // viser's list of commands
     else return;
     event.preventDefault(); // a button that was pressed last is not pressed again
+  }, true);
+  addEventListener("keyup", (event) => {
+    if (event.key !== " " || !event.isTrusted || isTyped(event.target)) return;
+    event.preventDefault();
+    if (!window.commissionSpace?.(false)) press("p", "KeyP"); // the command "Play or pause"
   }, true);
 })();

@@ -8,10 +8,11 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
+from commission.app.editing.editor import editors_of
 from commission.app.run.actions import ChooseSource, Play, VirtualDrive
 from commission.app.run.state import RunState
 from tests.app.sites import room
-from tests.browser.page import OpenPage
+from tests.browser.page import Button, OpenPage
 from tests.browser.serving import Served
 
 PLACE = (3.0, 2.0)
@@ -86,17 +87,40 @@ def test_the_wheel_zooms_to_the_pointer(page: OpenPage) -> None:
     assert pixels == pytest.approx(length * metre(page), abs=3.5)
 
 
-def test_the_middle_button_moves_the_floor(page: OpenPage) -> None:
-    at, before = np.array(page.pixel_of(PLACE)), metre(page)
+@pytest.mark.parametrize(("button", "key"), [("middle", None), ("left", "Space")])
+def test_the_middle_button_or_space_and_a_drag_moves_the_floor(
+    served: Served, page: OpenPage, button: Button, key: str | None
+) -> None:
+    at, before, playing = np.array(page.pixel_of(PLACE)), metre(page), served.state.part(RunState).playing
     page.page.mouse.move(*at)
-    page.page.mouse.down(button="middle")
+    if key:
+        page.page.keyboard.down(key)
+    page.page.mouse.down(button=button)
     page.page.mouse.move(at[0] + 90.0, at[1] + 40.0, steps=6)
     page.wait_until_still()  # where the processor draws, the hand is farther than the picture
-    page.page.mouse.up(button="middle")
+    page.page.mouse.up(button=button)
+    if key:
+        page.page.keyboard.up(key)
     page.wait_until_still()
     assert metre(page) == pytest.approx(before, rel=1e-3)
     np.testing.assert_allclose(np.array(page.pixel_of(PLACE)) - at, (90.0, 40.0), atol=6.0)
+    # It was no rectangle of a selection, nor was Space the key that plays.
+    assert all(each.drag is None and not each.has_selection for each in editors_of(served.state))
+    assert served.state.part(RunState).playing is playing
     assert page.errors == []
+
+
+def test_the_status_line_says_how_large_things_are_drawn_and_what_attracts(page: OpenPage) -> None:
+    page.page.wait_for_function("document.querySelector('.c-zoom').textContent !== ''")
+    shown = float(page.page.locator(".c-zoom").inner_text().removesuffix("px/m"))
+    assert shown == pytest.approx(metre(page), rel=0.01)
+    status = page.page.locator(".c-status")
+    assert status.inner_text().endswith("snap: walls")
+    page.open_tab("Selection")
+    page.unfold("Snapping", "To walls")
+    page.tick("To walls")
+    page.page.wait_for_function("document.querySelector('.c-status').textContent.endsWith('snap: off')")
+    page.tick("To walls")
 
 
 def test_space_plays_and_pauses_wherever_nothing_is_typed(served: Served, page: OpenPage) -> None:

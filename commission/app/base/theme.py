@@ -357,12 +357,12 @@ div:has(>.c-rows)~div .mantine-Button-label{{white-space:pre-wrap;text-align:lef
 [data-refused] :is(input,textarea){{border-color:{css(REFUSED)}!important}}
 [data-refused]::after{{content:attr(data-refused);flex-basis:100%;color:{css(REFUSED)};font-size:11.5px;
  line-height:1.3;padding-top:2px;overflow-wrap:anywhere}}
-.c-status{{position:fixed;z-index:1;display:flex;align-items:center;gap:8px;padding:2px 8px;border-radius:3px;
+.c-status{{position:fixed;z-index:1;display:flex;flex-wrap:wrap;align-items:center;gap:0 8px;padding:2px 8px;border-radius:3px;
  background:rgba(16,18,21,.8);color:{css(Worded.STATUS.dark)};font-size:12px;pointer-events:none;white-space:pre;
  font-variant-numeric:tabular-nums}}
 .c-ruler{{height:6px;border:1.5px solid {css(Worded.STATUS.dark)};border-top:none}}
 .c-length{{font-weight:400}}
-.c-place:not(:empty){{padding-left:10px}}
+.c-status span:not(:empty){{padding-left:10px}}
 .c-scale{{position:fixed;left:{LEFT_PX + 16}px;top:calc(var(--c-top) + 10px);padding:1px 8px;border-radius:3px;
  background:rgba(16,18,21,.8);color:{css(Worded.NOTE.dark)};font-size:12px;pointer-events:none;white-space:nowrap}}
 [data-dock-region=right] [role=tab]{{padding:0 .62em!important}}

@@ -7,7 +7,7 @@ from viser import GuiApi
 from commission.app.base.panel import BasePanel, escaped
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
-from commission.app.editing.editor import Editor, editor_of
+from commission.app.editing.editor import Editor, Snapping, editor_of
 from commission.app.editing.gestures import moved, selected_of
 from commission.app.editing.station_gestures import moved_station
 from commission.app.editing.tag_gestures import moved_tag
@@ -40,18 +40,31 @@ def _dragging(project: Project, editor: Editor) -> str:
     return f"{escaped(place.id)} to x {place.x:.3f} m, y {place.y:.3f} m"
 
 
+def attracts(snapping: Snapping) -> str:
+    """Say what attracts a reflector that is placed or dragged.
+
+    Parameters
+    ----------
+    snapping : of a browser.
+    """
+    grid = f"grid {snapping.grid:g} m" if snapping.grid else ""
+    found = [word for word, on in (("walls", snapping.walls), ("neighbors", snapping.neighbors), (grid, grid)) if on]
+    return f"snap: {', '.join(found) or 'off'}"
+
+
 class ToolHint(BasePanel):
-    """The line, in the middle above the floor."""
+    """The line, in the middle above the floor; and what attracts, which the status line below the floor reads there."""
 
     def __init__(self, gui: GuiApi, browser: int) -> None:
         self._browser = browser
         self._html = gui.add_html("")
-        self._shown = ""
+        self._shown = ("", "")
 
     def draw(self, view: PageView) -> None:
         """Follow the editor without delay."""
-        text = hint(view.state, self._browser)
+        text = hint(view.state, self._browser), attracts(editor_of(view.state, self._browser).snapping)
         if text == self._shown:
             return
         self._shown = text
-        self._html.content = f"<div class='c-hint'>{text}</div>" if text else ""
+        said = f"<div class='c-hint'>{text[0]}</div>" if text[0] else ""
+        self._html.content = f"{said}<span class='c-attracts' hidden>{text[1]}</span>"
