@@ -357,7 +357,8 @@ div:has(>.c-rows)~div .mantine-Button-label{{white-space:pre-wrap;text-align:lef
 [data-refused] :is(input,textarea){{border-color:{css(REFUSED)}!important}}
 [data-refused]::after{{content:attr(data-refused);flex-basis:100%;color:{css(REFUSED)};font-size:11.5px;
  line-height:1.3;padding-top:2px;overflow-wrap:anywhere}}
-.c-status{{position:fixed;z-index:1;display:flex;flex-wrap:wrap;align-items:center;gap:0 8px;padding:2px 8px;border-radius:3px;
+.c-status{{position:fixed;z-index:1;display:flex;flex-wrap:wrap;align-items:center;gap:0 8px;padding:2px 8px;
+ border-radius:3px;
  background:rgba(16,18,21,.8);color:{css(Worded.STATUS.dark)};font-size:12px;pointer-events:none;white-space:pre;
  font-variant-numeric:tabular-nums}}
 .c-ruler{{height:6px;border:1.5px solid {css(Worded.STATUS.dark)};border-top:none}}
