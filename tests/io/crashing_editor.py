@@ -15,7 +15,8 @@ from commission.io.journal import Journal
 from commission.io.journal_replay import restore
 from commission.io.project_file import load_project
 from commission.site.editing import reflectors as edits
-from commission.site.editing import routes, stations
+from commission.site.editing import routes
+from commission.site.editing.named import ROUTES, STATIONS
 from commission.site.floor_map import FREE, OCCUPIED
 from commission.site.presets import SCANNERS, with_preset
 from commission.site.project import Project
@@ -62,14 +63,14 @@ def _reflectors(project: Project, rng: random.Random) -> Project:
 def _routes(project: Project, rng: random.Random) -> Project:
     """Draw a route, or bend, reverse and slow down the last one."""
     if not project.routes or rng.random() < 0.4:
-        route = routes.new_route(routes.fresh_name(project.routes), [[0, 0], [rng.random() + 1, 2], [4, 4]])
+        route = routes.new_route(ROUTES.fresh(project.routes), [[0, 0], [rng.random() + 1, 2], [4, 4]])
         return replace(project, routes=(*project.routes[-MOST:], route))
     route = project.routes[-1]
     changed = routes.move_point(route, 0, 1, (rng.random(), rng.random()))
     changed = routes.set_value(changed, 0, "direction", rng.choice(list(Direction)))
     return replace(
         project,
-        routes=routes.put(project.routes, routes.set_value(changed, 0, "speed", rng.random() + 0.1), route.name),
+        routes=ROUTES.put(project.routes, routes.set_value(changed, 0, "speed", rng.random() + 0.1), route.name),
     )
 
 
@@ -77,15 +78,15 @@ def _stations(project: Project, rng: random.Random) -> Project:
     """Put a station, or take the first one away."""
     kept = project.stations[-MOST:]
     if kept and rng.random() < 0.3:
-        return replace(project, stations=stations.remove(kept, kept[0].name))
+        return replace(project, stations=STATIONS.remove(kept, kept[0].name))
     station = Station(
-        name=stations.fresh_name(kept),
+        name=STATIONS.fresh(kept),
         x=rng.random(),
         y=rng.random(),
         heading=rng.random(),
         required_accuracy=0.01 + rng.random(),
     )
-    return replace(project, stations=stations.put(kept, station))
+    return replace(project, stations=STATIONS.put(kept, station))
 
 
 def _equipment(project: Project, rng: random.Random) -> Project:

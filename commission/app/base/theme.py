@@ -190,6 +190,8 @@ def path_mark(kind: str) -> str:
 
 LABEL = "[data-dock-region] .mantine-Flex-root>[style*='flex-shrink: 0']:has(>p>label)"
 """Where the label of a widget stands: wide enough for most in one line; one of a check box has the line to itself."""
+SLIDER = ":has(+* :is(.mantine-Slider-track,.c-tail-slider))"
+"""Of a label: before a slider, which needs the room more than words need one line."""
 LIVE = "<div class='c-live'></div>"
 """An html element that lets the text field behind it tell of every key: one that seeks, and changes nothing."""
 
@@ -301,11 +303,9 @@ div:has(>div>.c-route)>:nth-child(1){{grid-column:span 3;padding-left:var(--c-ta
 .c-route{{font-size:12px;height:44px;display:flex;align-items:center;white-space:nowrap;overflow:hidden}}
 div:has(>:is(.c-wide,.c-live,.c-path,.c-list-line)){{display:none}}
 input:not(:focus){{text-overflow:ellipsis}}
-{LABEL}{{width:126px!important;padding-right:4px!important}}
-{LABEL}:has(+* .mantine-Slider-track){{width:130px!important}}
+{LABEL}:not({SLIDER}){{width:126px!important;padding-right:4px!important}}
 {LABEL} .mantine-Text-root{{letter-spacing:-.4px!important;font-size:12px!important}}
-{LABEL}:has(+* .mantine-Slider-track) .mantine-Text-root{{letter-spacing:-.5px!important;font-size:11.5px!important}}
-.mantine-Slider-root+*,.c-tail-tick+*{{width:50px!important;margin-left:5px!important}}
+{LABEL}{SLIDER} .mantine-Text-root{{letter-spacing:-.5px!important;font-size:11.5px!important}}
 .mantine-Flex-root:has(>div input[type=checkbox])>:has(>p>label){{flex:1 1 auto!important}}
 .mantine-Flex-root:has(>div input[type=checkbox])>:not(:has(label)){{flex:none!important}}
 div:has(>.c-wide)+*>.mantine-Flex-root>[style*="flex-shrink: 0"]{{display:none}}
