@@ -83,6 +83,8 @@ def test_files_are_found_by_looking_and_a_failed_open_changes_nothing(
     page.wait_for_text("Nothing has changed yet")
     assert served.state.project is project, "shown before, not after"
     page.press("Cancel")
+    # Until the button is back, another file is still being looked at.
+    page.page.get_by_role("button", name="Upload a file").wait_for()
     # Folders and empty files hold nothing up; of two tables the second waits to be dropped again.
     folder = served.state.folder
     assert folder is not None
