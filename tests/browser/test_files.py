@@ -45,7 +45,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     opened.close()
 
 
-def test_files_are_found_by_looking_and_a_failed_open_changes_nothing(
+def test_files_are_found_by_looking_and_a_failed_open_changes_nothing(  # noqa: PLR0915 - one window for all
     served: Served, window: Callable[..., OpenPage]
 ) -> None:
     page = window(served.server)
