@@ -152,13 +152,13 @@ def weigh(  # noqa: PLR0917 - the scan's detections and the map, array by array
     together of one that it does not allow: `tell_of_a_displacement`.
     """
     accepted, rejected, near, excused, pairs = 0.0, 0.0, 0.0, 0.0, NO_PAIRS
-    offset_x, offset_y = scanner_offset(belief.theta, model)
     for i in range(first, last):
         if status[i] == INLIER:
             accepted += 1.0
         elif status[i] == OUTLIER_ASSOCIATION:
             direction = belief.theta + model.mount_theta + detections[i, 1]
             measured = detections[i, 0] - model.range_bias
+            offset_x, offset_y = scanner_offset(belief.theta, model)
             qx = offset_x + measured * math.cos(direction)
             qy = offset_y + measured * math.sin(direction)
             x, y, reach = belief.x + qx, belief.y + qy, rule.reach + rule.turn * measured
