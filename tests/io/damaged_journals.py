@@ -48,7 +48,8 @@ def flip_bit(data: bytes, rng: random.Random) -> bytes:
 def change_byte(data: bytes, rng: random.Random) -> bytes:
     """One byte is another; often one that ends a line."""
     ends = [place for place, byte in enumerate(data) if byte == 10]
-    place = rng.choice(ends) if rng.random() < 0.3 else rng.randrange(len(data))
+    # What was damaged before may have no line that ends.
+    place = rng.choice(ends) if ends and rng.random() < 0.3 else rng.randrange(len(data))
     return data[:place] + rng.randbytes(1) + data[place + 1 :]
 
 
