@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import os
 import resource
+import socket
 import subprocess
 import sys
 from collections import Counter
@@ -88,13 +89,22 @@ def resident_mb() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
 
 
+def listening_at(address: SourceAddress) -> SourceAddress:
+    """Return an address with a port that is free: a listener finds one itself, who connects has to be told."""
+    port = 0
+    if address.kind.transport != "udp":
+        with socket.create_server((address.host, 0)) as server:
+            port = server.getsockname()[1]
+    return SourceAddress(address.name, address.host, port, address.scanner)
+
+
 def main(seconds: float, protocol: str) -> int:
     """Measure and print; return 1 where a record was lost."""
     project = load_project(bundled_folder("maps") / "warehouse")
     names = tuple(scanner.name for scanner in project.scanners)
     localizer.warm_up()
     asked = addresses_of(SourceAddress(protocol, "127.0.0.1", 1), names, None)
-    session = Session.of([SourceAddress(each.name, each.host, 0, each.scanner) for each in asked], names)
+    session = Session.of([listening_at(each) for each in asked], names)
     session.start()
     run, measured, clock = LiveRun(project), Measured(), session.clock
     run.prepare()

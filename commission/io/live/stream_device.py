@@ -93,6 +93,8 @@ class StreamDevice:
                 continue
             except OSError:
                 return
+            # An answer of two frames is not held back until the first one is acknowledged, which takes 40 ms.
+            opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             opened.settimeout(LOOK_UP_S)
             client = StreamClient(opened)
             self._clients.append(client)
