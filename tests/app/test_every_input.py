@@ -36,10 +36,9 @@ from commission.app.editing.actions import (
     SetSegment,
     SetSelected,
 )
-from commission.app.editing.editor import ControlPoint, editor_of
+from commission.app.editing.editor import ControlPoint, PosedKey, PosedKind, editor_of
+from commission.app.editing.posed_actions import SelectPosed, SetPosed
 from commission.app.editing.selection_panel import SelectionPanel
-from commission.app.editing.station_actions import SelectStation, SetStation
-from commission.app.editing.tag_actions import SelectTag, SetTag
 from commission.app.editing.tool_panel import SnappingPanel
 from commission.app.floor_map.actions import SetPlantPoint
 from commission.app.floor_map.align_tool import AlignTool, NamedPoint
@@ -504,7 +503,7 @@ OWN = {
     ),
     "station": Own(
         make=selection,
-        asked=(SelectStation("Dock"),),
+        asked=(SelectPosed(PosedKey(PosedKind.STATION, "Dock")),),
         rows={
             "x": Row(label="x [m]", read=station("x"), **FAR),
             "y": Row(label="y [m]", read=station("y"), **FAR),
@@ -520,7 +519,7 @@ OWN = {
     ),
     "tag": Own(
         make=selection,
-        asked=(SelectTag("M"),),
+        asked=(SelectPosed(PosedKey(PosedKind.TAG, "M")),),
         rows={
             "x": Row(label="x [m]", read=mark("x"), **FAR),
             "y": Row(label="y [m]", read=mark("y"), **FAR),
@@ -651,11 +650,15 @@ def test_a_number_of_ones_own_is_shown_taken_and_bounded_as_its_row_says(
     bench = PanelBench(server, site, replace(own, make=make))
     found = [(name_of(posted), widget) for posted, widget in named_widgets(bench) if widget.visible]
     is_of_selection = what in ("reflector", "station", "tag", "route")
-    inside = {"reflector": SetSelected, "station": SetStation, "tag": SetTag, "route": SetCoordinate | SetSegment}
+    inside = {"reflector": SetSelected, "station": SetPosed, "tag": SetPosed, "route": SetCoordinate | SetSegment}
+
+    def is_inside(posted: Action) -> bool:
+        return isinstance(posted, inside[what]) and getattr(posted, "kind", what) == what
+
     widgets = {
         found_name: widget
         for found_name, widget in found
-        if not is_of_selection or isinstance(bench.change(widget, another(widget))[0], inside[what])
+        if not is_of_selection or is_inside(bench.change(widget, another(widget))[0])
     }
     # No field without its widget, and no widget without a field.
     assert set(widgets) == set(own.rows)

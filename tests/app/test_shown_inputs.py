@@ -23,8 +23,9 @@ from commission.app.base.server import start_server
 from commission.app.base.state import AppState
 from commission.app.base.view import view_of
 from commission.app.editing.actions import SelectReflectors
+from commission.app.editing.editor import PosedKey, PosedKind
+from commission.app.editing.posed_actions import SelectPosed
 from commission.app.editing.selection_panel import SelectionPanel
-from commission.app.editing.station_actions import SelectStation
 from commission.app.page import Page
 from commission.site.parameters import Parameters
 from commission.site.project import Project
@@ -283,7 +284,7 @@ SELECTED: dict[str, tuple[Action, dict[str, tuple[str, float]]]] = {
         },
     ),
     "station": (
-        SelectStation("Dock"),
+        SelectPosed(PosedKey(PosedKind.STATION, "Dock")),
         {
             "x [m]": ("x", 1.0),
             "y [m]": ("y", 1.0),
@@ -307,7 +308,7 @@ def test_numbers_of_what_is_selected_are_shown_and_set_in_the_units_of_their_lab
     try:
         panel = SelectionPanel(server.gui, taking(posted), ME)
         panel.draw_slowly(view_of(state))
-        inside = (panel._station._fields if what == "station" else panel._fields).values()
+        inside = (panel._posed[PosedKind.STATION]._fields if what == "station" else panel._fields).values()
         # What may be unknown is typed as a text.
         typed = [each for each in inside if is_number(each) or "unknown" in (each.hint or "")]
         widgets = {each.label: each for each in typed}

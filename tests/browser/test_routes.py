@@ -52,7 +52,7 @@ def test_a_station_is_placed_typed_dragged_and_seen_by_another_browser(
     assert abs(station.heading) < math.radians(30.0)
     label = f"/station_names/{station.name.encode().hex()}"
     other.wait_until_drawn((label,))
-    assert site.editor(theirs).station == ""
+    assert site.editor(theirs).posed is None
     assert site.editor(theirs).tool is None
     other.open_tab("Routes")
     other.wait_for_text(f"{station.name}   100 mm")

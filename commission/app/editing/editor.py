@@ -42,6 +42,23 @@ class Drag:
         return self.now[0] - self.start[0], self.now[1] - self.start[1]
 
 
+class PosedKind(StrEnum):
+    """What has a name, a place and a heading."""
+
+    STATION = "station"
+    TAG = "tag"
+
+
+@dataclass(frozen=True, slots=True)
+class PosedKey:
+    """A station or a tag."""
+
+    kind: PosedKind
+    """Which of both."""
+    name: str
+    """Name of the station, id of the tag."""
+
+
 @dataclass(frozen=True, slots=True)
 class ControlPoint:
     """A control point of a planned route."""
@@ -81,10 +98,8 @@ class Editor:
     """Ids of the selected reflectors."""
     point: ControlPoint | None = None
     """The selected control point; its route is the selected one."""
-    station: str = ""
-    """Name of the selected station; empty: none."""
-    tag: str = ""
-    """Id of the selected tag; empty: none."""
+    posed: PosedKey | None = None
+    """The selected station or tag."""
     drag: Drag | None = None
     """A drag under way."""
     last_click: Point | None = None
@@ -95,7 +110,11 @@ class Editor:
     """How near a click has to be to mean something, at the zoom of the newest gesture [m]."""
 
     def selecting(
-        self, reflectors: tuple[str, ...] = (), *, point: ControlPoint | None = None, station: str = "", tag: str = ""
+        self,
+        reflectors: tuple[str, ...] = (),
+        *,
+        point: ControlPoint | None = None,
+        posed: PosedKey | None = None,
     ) -> Editor:
         """Return the editor with this selected and nothing else.
 
@@ -103,10 +122,9 @@ class Editor:
         ----------
         reflectors : ids.
         point : control point of a route.
-        station : name; empty: none.
-        tag : id; empty: none.
+        posed : station or tag.
         """
-        return replace(self, selected=reflectors, point=point, station=station, tag=tag)
+        return replace(self, selected=reflectors, point=point, posed=posed)
 
     def using(self, tool: Tool | None, state: AppState) -> Editor:
         """Return the editor with another tool: what was begun with the old one is dropped, unless that tool keeps it.
@@ -137,7 +155,7 @@ class Editor:
     @property
     def has_selection(self) -> bool:
         """Whether anything is selected."""
-        return bool(self.selected) or self.point is not None or bool(self.station) or bool(self.tag)
+        return bool(self.selected) or self.point is not None or self.posed is not None
 
 
 def editor_of(state: AppState, browser: int | None) -> Editor:

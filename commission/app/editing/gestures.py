@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from commission.app.editing.editor import Drag, Editor, Grab, Point
-from commission.app.editing.posed_gestures import grabbed_of, nearest_posed
+from commission.app.editing.posed_gestures import grabbed_of, posed_at
+from commission.app.editing.posed_kinds import mark_of
 from commission.app.editing.route_gestures import control_point_at
-from commission.app.editing.station_gestures import station_at, station_of
-from commission.app.editing.tag_gestures import tag_at, tag_of
 from commission.geometry import se2
 from commission.geometry.occupancy import OccupancyGrid
 from commission.site.editing import reflectors as edits
@@ -111,10 +110,9 @@ def marked_place(project: Project, place: Point, reach: float) -> Point:
     if found is not None:
         hit = next(r for r in project.reflectors.reflectors if r.id == found)
         return hit.x, hit.y
-    for marks in (project.stations, project.tags):
-        nearest = nearest_posed(marks, place, reach)
-        if nearest is not None:
-            return marks[nearest].x, marks[nearest].y
+    mark = mark_of(project, posed_at(project, place, reach))
+    if mark is not None:
+        return mark.x, mark.y
     return corner_at(project, place, reach) or place
 
 
@@ -196,9 +194,9 @@ def grabbed(project: Project, editor: Editor, drag: Drag) -> Editor:
     drag : from its start to where it is now [m], map frame.
     """
     reach = editor.reach
-    posed = grabbed_of(project, station_of(project, editor) or tag_of(project, editor), drag.start, reach)
-    if posed is not None:
-        return replace(editor, drag=replace(drag, grab=posed))
+    grab = grabbed_of(project, mark_of(project, editor.posed), drag.start, reach)
+    if grab is not None:
+        return replace(editor, drag=replace(drag, grab=grab))
     point = None if editor.point is None else control_point_at(project, editor.point.route, drag.start, reach)
     if point is not None:
         return replace(editor, point=point, drag=replace(drag, grab=Grab.CONTROL_POINT))
@@ -206,10 +204,7 @@ def grabbed(project: Project, editor: Editor, drag: Drag) -> Editor:
     if found is not None:
         selected = editor.selected if found in editor.selected else (found,)
         return replace(editor.selecting(selected), drag=replace(drag, grab=Grab.REFLECTORS))
-    station = station_at(project, drag.start, reach)
-    if station is not None:
-        return replace(editor.selecting(station=station), drag=replace(drag, grab=Grab.POSED))
-    tag = tag_at(project, drag.start, reach)
-    if tag is not None:
-        return replace(editor.selecting(tag=tag), drag=replace(drag, grab=Grab.POSED))
+    posed = posed_at(project, drag.start, reach)
+    if posed is not None:
+        return replace(editor.selecting(posed=posed), drag=replace(drag, grab=Grab.POSED))
     return replace(editor, drag=replace(drag, grab=Grab.RECTANGLE))

@@ -21,15 +21,15 @@ from commission.app.base.view import PageView
 from commission.app.editing import actions
 from commission.app.editing.editor import Editor, Grab
 from commission.app.editing.gestures import moved, selected_of
-from commission.app.editing.posed_gestures import Posed, heading_tip
+from commission.app.editing.posed_gestures import heading_tip, moved_posed
+from commission.app.editing.posed_kinds import PosedMark
 from commission.app.editing.route_gestures import curve, moved_route
-from commission.app.editing.station_gestures import moved_station
 from commission.app.editing.station_layer import station_marks
-from commission.app.editing.tag_gestures import moved_tag
 from commission.app.editing.tag_layer import tag_strokes
 from commission.app.editing.tool import Label
 from commission.geometry.arrays import FloatArray
 from commission.site.project import Project
+from commission.site.tags import Tag
 
 HANDLE_FROM = 14.0
 """Size of the selection's handle, in sizes of a mark."""
@@ -81,7 +81,7 @@ class Overlay(BasePanel):
         size = 0.9 * extent_of(project).mark_size()
         selected = selected_of(project, editor)
         centers = np.array([(r.x, r.y) for r in selected]).reshape(-1, 2)
-        ringed = np.concatenate([centers, _point_place(project, editor), _places(_posed(project, editor))])
+        ringed = np.concatenate([centers, _point_place(project, editor), _places(moved_posed(project, editor))])
         self._selected.points = outline_segments(rings(ringed, 1.5 * size), theme.Height.EDITING)
         self._preview.points = self._preview_of(view.state, editor, size)
         self._draw_points(project, editor, size)
@@ -110,12 +110,11 @@ class Overlay(BasePanel):
         elif drag is not None and drag.grab is Grab.RECTANGLE:
             (x0, y0), (x1, y1) = drag.start, drag.now
             lines.append(outline_segments(np.array([[(x0, y0), (x1, y0), (x1, y1), (x0, y1)]]), height))
-        station, tag, posed = moved_station(project, editor), moved_tag(project, editor), _posed(project, editor)
-        if station is not None:
-            lines.append(outline_segments(station_marks((station,), size), height))
-        if tag is not None:
-            lines.append(tag_strokes((tag,), height))
+        posed = moved_posed(project, editor)
         if posed is not None:
+            is_tag = isinstance(posed, Tag)
+            shape = tag_strokes((posed,), height) if is_tag else outline_segments(station_marks((posed,), size), height)
+            lines.append(shape)
             # A line to the tip by which it is turned.
             lines.append(polyline_segments(np.array([(posed.x, posed.y), heading_tip(project, posed)]), height))
         if editor.point is not None:
@@ -131,7 +130,7 @@ class Overlay(BasePanel):
         places = [np.array(() if editor.tool is None else editor.tool.marks(), dtype=np.float64).reshape(-1, 2)]
         if editor.point is not None:
             places += [segment.control_points for segment in moved_route(project, editor)]
-        posed = _posed(project, editor)
+        posed = moved_posed(project, editor)
         if posed is not None:
             places.append(np.array([heading_tip(project, posed)]))
         self._points.point_size = size
@@ -148,12 +147,7 @@ class Overlay(BasePanel):
             self._labels[index].text, self._labels[index].position = text, position
 
 
-def _posed(project: Project, editor: Editor) -> Posed | None:
-    """Return the selected station or tag as the drag under way would leave it."""
-    return moved_station(project, editor) or moved_tag(project, editor)
-
-
-def _places(posed: Posed | None) -> FloatArray:
+def _places(posed: PosedMark | None) -> FloatArray:
     """Return the (1, 2) place of a station or a tag [m]; (0, 2) when there is none."""
     return np.empty((0, 2)) if posed is None else np.array([[posed.x, posed.y]])
 

@@ -20,11 +20,10 @@ from commission.app.editing.gestures import (
     reflectors_in,
     selected_of,
 )
+from commission.app.editing.posed_actions import DeletePosed, MovePosed
+from commission.app.editing.posed_gestures import moved_posed, posed_at
+from commission.app.editing.posed_kinds import mark_of
 from commission.app.editing.route_gestures import route_at
-from commission.app.editing.station_actions import DeleteStation, MoveStation
-from commission.app.editing.station_gestures import moved_station, station_at, station_of
-from commission.app.editing.tag_actions import DeleteTag, MoveTag
-from commission.app.editing.tag_gestures import moved_tag, tag_at, tag_of
 from commission.errors import UsageError
 from commission.site.editing import reflectors as edits
 from commission.site.editing.snapping import snap_to_wall
@@ -123,12 +122,9 @@ def _picked(state: AppState, editor: Editor, action: ClickFloor) -> Editor:
         return editor.selecting(others if found in editor.selected else (*others, found))
     if action.add:
         return editor
-    station = station_at(state.project, action.place, action.reach)
-    if station is not None:
-        return editor.selecting(station=station)
-    tag = tag_at(state.project, action.place, action.reach)
-    if tag is not None:
-        return editor.selecting(tag=tag)
+    posed = posed_at(state.project, action.place, action.reach)
+    if posed is not None:
+        return editor.selecting(posed=posed)
     return editor.selecting(point=route_at(state.project, action.place, action.reach))
 
 
@@ -177,11 +173,9 @@ def nudge(action: actions.Nudge, state: AppState, sender: Sender) -> Outcome:
         edit = Edit(f"move {counted(state, editor)}", sender, f"{ids}:nudge")
         moved_map = edits.move(state.project.reflectors, ids, action.by)
         return _telling_of_locked(state, ids, with_reflectors(state, moved_map, edit))
-    station, tag = station_of(state.project, editor), tag_of(state.project, editor)
-    if station is not None:
-        return reduce(MoveStation((station.x + dx, station.y + dy), station.heading), state, sender)
-    if tag is not None:
-        return reduce(MoveTag((tag.x + dx, tag.y + dy), tag.heading), state, sender)
+    mark = mark_of(state.project, editor.posed)
+    if editor.posed is not None and mark is not None:
+        return reduce(MovePosed(editor.posed.kind, (mark.x + dx, mark.y + dy), mark.heading), state, sender)
     if editor.point is None:
         return Outcome(state)
     segments = state.project.route(editor.point.route).segments
@@ -209,12 +203,10 @@ def _dropped(state: AppState, editor: Editor, sender: Sender) -> Outcome:
 
 def _turned_or_moved(state: AppState, editor: Editor, resting: AppState, sender: Sender) -> Outcome:
     """Leave the dragged station or tag where it is, or looking there."""
-    station, tag = moved_station(state.project, editor), moved_tag(state.project, editor)
-    if station is not None:
-        return reduce(MoveStation((station.x, station.y), station.heading), resting, sender)
-    if tag is not None:
-        return reduce(MoveTag((tag.x, tag.y), tag.heading), resting, sender)
-    return Outcome(resting)
+    mark = moved_posed(state.project, editor)
+    if editor.posed is None or mark is None:
+        return Outcome(resting)
+    return reduce(MovePosed(editor.posed.kind, (mark.x, mark.y), mark.heading), resting, sender)
 
 
 def _moved(state: AppState, editor: Editor, resting: AppState, sender: Sender) -> Outcome:
@@ -252,10 +244,8 @@ def delete_selected(_action: actions.DeleteSelected, state: AppState, sender: Se
     editor = editor_of(state, sender.browser)
     if editor.point is not None and not editor.selected:
         return reduce(actions.DeleteControlPoint(), state, sender)
-    if editor.station:
-        return reduce(DeleteStation(), state, sender)
-    if editor.tag:
-        return reduce(DeleteTag(), state, sender)
+    if editor.posed is not None:
+        return reduce(DeletePosed(editor.posed.kind), state, sender)
     editor, ids = _selection(state, sender)
     edit = Edit(f"delete {counted(state, editor)}", sender)
     return _telling_of_locked(state, ids, with_reflectors(state, edits.delete(state.project.reflectors, ids), edit))

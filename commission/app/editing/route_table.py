@@ -14,9 +14,8 @@ from commission.app.base.panel import BasePanel, Post
 from commission.app.base.rows import Rows
 from commission.app.base.view import PageView
 from commission.app.editing import actions
-from commission.app.editing.editor import ControlPoint, Editor
-from commission.app.editing.station_actions import SelectStation
-from commission.app.editing.tag_actions import SelectTag
+from commission.app.editing.editor import ControlPoint, Editor, PosedKey, PosedKind
+from commission.app.editing.posed_actions import SelectPosed
 from commission.site.project import Project
 from commission.site.quantity import DEGREES
 from commission.site.routes import Direction, Route
@@ -36,10 +35,8 @@ class Row:
     """What it says."""
     route: str = ""
     """Name of the route that it is about; empty: none."""
-    station: str = ""
-    """Name of the station that it is about; empty: none."""
-    tag: str = ""
-    """Id of the tag that it is about; empty: none."""
+    posed: PosedKey | None = None
+    """The station or the tag that it is about."""
 
 
 def route_row(route: Route, violations: int) -> Row:
@@ -57,14 +54,15 @@ def station_row(station: Station) -> Row:
     """Return a station on one line."""
     return Row(
         f"{station.name}   {ACCURACY.brief(station.required_accuracy)}  {station.x:.2f}  {station.y:.2f} m",
-        station=station.name,
+        posed=PosedKey(PosedKind.STATION, station.name),
     )
 
 
 def tag_row(tag: Tag) -> Row:
     """Return a tag on one line."""
     name = f"tag, no id ({tag.id})" if tag.anonymous else f"tag {tag.id}"
-    return Row(f"{name}   {tag.x:.2f}  {tag.y:.2f} m  {DEGREES.text(tag.heading, '.1f')}", tag=tag.id)
+    place = f"{tag.x:.2f}  {tag.y:.2f} m  {DEGREES.text(tag.heading, '.1f')}"
+    return Row(f"{name}   {place}", posed=PosedKey(PosedKind.TAG, tag.id))
 
 
 def rows(project: Project, violations: Counter[str], sought: str) -> list[Row]:
@@ -98,7 +96,7 @@ class RouteTable(BasePanel):
         chosen = "" if editor.point is None else editor.point.route
         findings = view.part(ProblemsResult)
         drawn = (project.routes, project.stations, project.tags, findings)
-        asked = (self._find.value, chosen, editor.station, editor.tag)
+        asked = (self._find.value, chosen, editor.posed)
         if self._drawn and self._drawn[-1] == asked and all(a is b for a, b in zip(self._drawn, drawn, strict=False)):
             return
         self._drawn = (*drawn, asked)
@@ -120,16 +118,13 @@ class RouteTable(BasePanel):
         if index >= len(self._shown):
             return page_actions.Report("this row is gone", failed=False)
         row = self._shown[index]
-        if row.station:
-            return SelectStation(row.station, fly=True)
-        if row.tag:
-            return SelectTag(row.tag, fly=True)
+        if row.posed is not None:
+            return SelectPosed(row.posed, fly=True)
         return actions.SelectControlPoint(ControlPoint(row.route), fly=True)
 
 
 def _color(row: Row, route: str, editor: Editor, violations: Counter[str], fatal: set[str]) -> theme.Color:
-    chosen = {(route, "", ""), ("", editor.station, ""), ("", "", editor.tag)}
-    if (row.route, row.station, row.tag) in chosen:
+    if row.posed == editor.posed if row.posed is not None else row.route == route:
         return theme.SELECTED_LINE
     if row.route in fatal:
         return theme.ERROR_LINE

@@ -15,15 +15,13 @@ from commission.app.base.panel import BasePanel, Post, escaped, posting, table
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
 from commission.app.editing import actions
-from commission.app.editing.editor import Editor
+from commission.app.editing.editor import Editor, PosedKind
 from commission.app.editing.gestures import selected_of
+from commission.app.editing.posed_fields import PosedFields
+from commission.app.editing.posed_kinds import mark_of
 from commission.app.editing.route_fields import RouteFields
 from commission.app.editing.route_gestures import route_of
 from commission.app.editing.site_tools import measurement
-from commission.app.editing.station_fields import StationFields
-from commission.app.editing.station_gestures import station_of
-from commission.app.editing.tag_fields import TagFields
-from commission.app.editing.tag_gestures import tag_of
 from commission.site.fields import get_field, names_of
 from commission.site.project import Project
 from commission.site.quantity import DEGREES
@@ -65,8 +63,7 @@ class SelectionPanel(BasePanel):
             self._add_mirror()
             self._add_repeat()
         self._route = RouteFields(gui, post, browser)
-        self._station = StationFields(gui, post, browser)
-        self._tag = TagFields(gui, post, browser)
+        self._posed = {kind: PosedFields(gui, post, browser, kind) for kind in PosedKind}
 
     def _pressed(self, event: GuiEvent[Any]) -> page_actions.Action:
         """Return the action of one of the buttons."""
@@ -127,8 +124,8 @@ class SelectionPanel(BasePanel):
                 shown = shown and any(r.kind is ReflectorKind.FLAT for r in self._reflectors)
             show(widget, visible=shown)
         self._route.show(view.state)
-        self._station.show(view.state)
-        self._tag.show(view.state)
+        for fields in self._posed.values():
+            fields.show(view.state)
 
     def _read(self, _state: AppState, name: str) -> Any:
         """Return a value of the selection, the first one's where several are selected; None: of nothing."""
@@ -159,19 +156,17 @@ def _head(editor: Editor, reflectors: tuple[Reflector, ...], project: Project) -
         ]
     if editor.last_click is not None and not reflectors:
         rows.append(("Last click x, y", f"{editor.last_click[0]:.3f}, {editor.last_click[1]:.3f} m"))
-    # What is selected may be gone: deleted here, or by another browser; an undo brings it back selected.
-    station, tag = station_of(project, editor), tag_of(project, editor)
-    is_there = bool(reflectors) or route_of(project, editor) or station or tag
-    if not is_there:
-        return f"<div style='padding:2px 14px 2px 6px'>{table(rows)}{'' if editor.tool else NOTHING}</div>"
-    if len(reflectors) > 1:
-        title = f"{len(reflectors)} reflectors"
-    elif reflectors:
-        title = f"Reflector {escaped(reflectors[0].id)}"
-    elif editor.point is not None:
-        title = _called("Route", editor.point.route)
-    elif tag is not None:
-        title = f"Tag {escaped(tag.id)}"
-    else:
-        title = _called("Station", editor.station)
-    return f"<div style='padding:2px 14px 2px 6px'>{table(rows)}<div class='c-selected'><b>{title}</b></div></div>"
+    title = _title(editor, reflectors, project)
+    said = f"<div class='c-selected'><b>{title}</b></div>" if title else "" if editor.tool else NOTHING
+    return f"<div style='padding:2px 14px 2px 6px'>{table(rows)}{said}</div>"
+
+
+def _title(editor: Editor, reflectors: tuple[Reflector, ...], project: Project) -> str:
+    """Say what is selected; empty where that is nothing, or gone: an undo brings it back selected."""
+    if reflectors:
+        return f"Reflector {escaped(reflectors[0].id)}" if len(reflectors) == 1 else f"{len(reflectors)} reflectors"
+    if editor.point is not None:
+        return _called("Route", editor.point.route) if route_of(project, editor) else ""
+    if editor.posed is not None and mark_of(project, editor.posed) is not None:
+        return _called(editor.posed.kind.capitalize(), editor.posed.name)
+    return ""

@@ -11,13 +11,12 @@ from commission.app.base.actions import ClickFloor, Point, Sender
 from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState, Edit
 from commission.app.editing.drawing_tools import DrawingTool
-from commission.app.editing.editor import ControlPoint, Editor, editor_of, with_tool
+from commission.app.editing.editor import ControlPoint, Editor, PosedKind, editor_of, with_tool
 from commission.app.editing.gestures import marked_place, to_place
+from commission.app.editing.posed_actions import PlacePosed
 from commission.app.editing.reducer import with_reflectors
 from commission.app.editing.route_gestures import curve
 from commission.app.editing.site_reducer import with_routes
-from commission.app.editing.station_actions import PlaceStation
-from commission.app.editing.tag_actions import PlaceTag
 from commission.app.editing.tool import Label, Tool
 from commission.geometry.arrays import FloatArray
 from commission.site.editing import reflectors as edits
@@ -79,7 +78,7 @@ class StationTool(Tool):
 
     def clicked(self, state: AppState, click: ClickFloor, sender: Sender) -> Outcome:
         """Place a station."""
-        return reduce(PlaceStation(click.place, click.reach), state, sender)
+        return reduce(PlacePosed(PosedKind.STATION, click.place, click.reach), state, sender)
 
     def hint(self, state: AppState, browser: int) -> str:  # noqa: ARG002 - the tool's
         """Say what a click does."""
@@ -94,7 +93,7 @@ class TagTool(Tool):
 
     def clicked(self, state: AppState, click: ClickFloor, sender: Sender) -> Outcome:
         """Place a tag."""
-        return reduce(PlaceTag(click.place), state, sender)
+        return reduce(PlacePosed(PosedKind.TAG, click.place, click.reach), state, sender)
 
     def hint(self, state: AppState, browser: int) -> str:  # noqa: ARG002 - the tool's
         """Say what a click does."""

@@ -9,8 +9,8 @@ from commission.app.base.state import AppState
 from commission.app.base.view import PageView
 from commission.app.editing.editor import Editor, Snapping, editor_of
 from commission.app.editing.gestures import moved, selected_of
-from commission.app.editing.station_gestures import moved_station
-from commission.app.editing.tag_gestures import moved_tag
+from commission.app.editing.posed_gestures import moved_posed
+from commission.app.editing.posed_kinds import KINDS
 from commission.site.project import Project
 from commission.site.quantity import DEGREES
 
@@ -18,18 +18,17 @@ from commission.site.quantity import DEGREES
 def hint(state: AppState, browser: int) -> str:
     """Return where what is dragged comes to lie, or what the tool in use expects; empty: nothing to say."""
     editor = editor_of(state, browser)
-    if editor.drag is not None and (editor.selected or editor.station or editor.tag):
+    if editor.drag is not None and (editor.selected or editor.posed is not None):
         return _dragging(state.project, editor)
     return "" if editor.tool is None else editor.tool.hint(state, browser)
 
 
 def _dragging(project: Project, editor: Editor) -> str:
     """Say where what is being dragged would come to lie."""
-    station, tag = moved_station(project, editor), moved_tag(project, editor)
-    for name, posed in ((editor.station, station), (f"tag {editor.tag}", tag)):
-        if posed is not None:
-            heading = DEGREES.text(posed.heading, ".1f")
-            return f"{escaped(name)} to x {posed.x:.3f} m, y {posed.y:.3f} m, heading {heading}"
+    mark = moved_posed(project, editor)
+    if editor.posed is not None and mark is not None:
+        called, heading = KINDS[editor.posed.kind].called(mark), DEGREES.text(mark.heading, ".1f")
+        return f"{escaped(called)} to x {mark.x:.3f} m, y {mark.y:.3f} m, heading {heading}"
     selected = selected_of(project, editor)
     if editor.drag is None or len(selected) == 0:
         return ""

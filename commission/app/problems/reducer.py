@@ -8,7 +8,7 @@ from commission.app.base.actions import Sender
 from commission.app.base.effects import FlyTo, Tell
 from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState, Edit
-from commission.app.editing.editor import editor_of
+from commission.app.editing.editor import PosedKey, PosedKind, editor_of
 from commission.app.editing.reducer import with_reflectors
 from commission.app.editing.route_gestures import control_point_at
 from commission.app.editing.zone_reducer import ShownZone
@@ -52,7 +52,7 @@ def show_problem(action: ShowProblem, state: AppState, sender: Sender) -> Outcom
     if problem.subject is Subject.REFLECTOR:
         editor = editor.selecting(problem.ids)
     elif problem.subject is Subject.STATION and problem.ids:
-        editor = editor.selecting(station=problem.ids[0])
+        editor = editor.selecting(posed=PosedKey(PosedKind.STATION, problem.ids[0]))
     elif problem.subject is Subject.ROUTE and problem.ids:
         near = problem.place or (0.0, 0.0)
         editor = editor.selecting(point=control_point_at(state.project, problem.ids[0], near, float("inf")))

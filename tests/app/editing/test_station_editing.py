@@ -13,11 +13,11 @@ from commission.app.base.server import start_server
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
 from commission.app.editing import actions
-from commission.app.editing.editor import ControlPoint, Editor
+from commission.app.editing.editor import ControlPoint, Editor, PosedKey, PosedKind
+from commission.app.editing.posed_actions import AlignStation, DeletePosed, SelectPosed, SetPosed
 from commission.app.editing.posed_gestures import heading_tip
 from commission.app.editing.route_table import RouteTable
 from commission.app.editing.site_tools import StationTool
-from commission.app.editing.station_actions import AlignStation, DeleteStation, SelectStation, SetStation
 from commission.app.editing.station_layer import StationLayer
 from commission.app.editing.tool_hint import hint
 from commission.app.problems.actions import ShowProblem
@@ -77,7 +77,7 @@ def test_a_click_places_a_station_and_near_a_route_it_stands_on_it_and_looks_alo
     assert (on_route.x, on_route.y) == pytest.approx(tuple(curve.point(u)), abs=1e-6)
     assert on_route.heading == pytest.approx(float(curve.heading(u)), abs=1e-6)
     assert [step.name for step in result.undo] == ["place Station 1", "place Station 2"]
-    assert editor(result).station == "Station 2"
+    assert editor(result).posed == PosedKey(PosedKind.STATION, "Station 2")
 
 
 def test_a_station_is_dragged_as_one_step_and_a_route_attracts_it(placed: AppState) -> None:
@@ -111,22 +111,24 @@ def test_while_it_is_dragged_the_page_says_where_it_would_stand(placed: AppState
 def test_name_pose_and_accuracy_are_typed_and_typing_is_one_step(placed: AppState) -> None:
     typed = after(
         placed,
-        SetStation("name", "Dock"),
-        SetStation("required_accuracy", 0.02),
-        by(ME, SetStation("required_accuracy", 0.01), 0.4),
-        by(ME, SetStation("heading", 1.0), 0.6),
+        SetPosed(PosedKind.STATION, "name", "Dock"),
+        SetPosed(PosedKind.STATION, "required_accuracy", 0.02),
+        by(ME, SetPosed(PosedKind.STATION, "required_accuracy", 0.01), 0.4),
+        by(ME, SetPosed(PosedKind.STATION, "heading", 1.0), 0.6),
     )
     assert station(typed) == Station(name="Dock", x=3.0, y=5.0, heading=1.0, required_accuracy=0.01)
     assert [step.name for step in typed.undo[1:]] == ["rename Station 1", "set accuracy of Dock", "set heading of Dock"]
-    assert editor(typed).station == "Dock"
+    assert editor(typed).posed == PosedKey(PosedKind.STATION, "Dock")
     with pytest.raises(ValueError, match="required_accuracy"):
-        after(typed, SetStation("required_accuracy", 0.0))
+        after(typed, SetPosed(PosedKind.STATION, "required_accuracy", 0.0))
     with pytest.raises(UsageError, match="used already"):
-        after(typed, actions.ChooseTool(StationTool()), click(1.0, 6.0), SetStation("name", "Dock"))
+        after(typed, actions.ChooseTool(StationTool()), click(1.0, 6.0), SetPosed(PosedKind.STATION, "name", "Dock"))
 
 
 def test_a_new_station_is_as_accurate_as_the_one_before(placed: AppState) -> None:
-    docks = after(placed, SetStation("required_accuracy", 0.01), actions.ChooseTool(StationTool()), click(5, 6))
+    docks = after(
+        placed, SetPosed(PosedKind.STATION, "required_accuracy", 0.01), actions.ChooseTool(StationTool()), click(5, 6)
+    )
     assert station(docks).required_accuracy == 0.01
 
 
@@ -139,27 +141,31 @@ def test_a_station_goes_onto_the_nearest_route_when_that_is_asked_for(placed: Ap
 def test_the_delete_key_deletes_the_selected_station(placed: AppState) -> None:
     gone = after(placed, actions.DeleteSelected())
     assert gone.project.stations == ()
-    assert editor(gone).station == ""
+    assert editor(gone).posed is None
     with pytest.raises(UsageError, match="no station is selected"):
-        after(gone, DeleteStation())
+        after(gone, DeletePosed(PosedKind.STATION))
 
 
 def test_clicks_select_one_kind_of_thing_at_a_time(placed: AppState) -> None:
     reflector = after(placed, click(0.25, 2.0))
-    assert (editor(reflector).selected, editor(reflector).station) == (("R1",), "")
-    assert editor(reflector, OTHER).station == ""
+    assert (editor(reflector).selected, editor(reflector).posed) == (("R1",), None)
+    assert editor(reflector, OTHER).posed is None
     again = after(reflector, click(3.0, 5.0))
-    assert (editor(again).selected, editor(again).station) == ((), "Station 1")
+    assert (editor(again).selected, editor(again).posed) == ((), PosedKey(PosedKind.STATION, "Station 1"))
     route = after(again, click(4.0, 2.1))
     assert editor(route).point is not None
-    assert editor(route).station == ""
+    assert editor(route).posed is None
     assert not editor(after(route, actions.Cancel())).has_selection
 
 
 def test_what_another_browser_deletes_is_not_selected_any_more(placed: AppState) -> None:
-    gone = after(placed, by(OTHER, SelectStation("Station 1")), by(OTHER, DeleteStation()))
+    gone = after(
+        placed,
+        by(OTHER, SelectPosed(PosedKey(PosedKind.STATION, "Station 1"))),
+        by(OTHER, DeletePosed(PosedKind.STATION)),
+    )
     with pytest.raises(UsageError, match="no station is selected"):
-        after(gone, SetStation("x", 1.0))
+        after(gone, SetPosed(PosedKind.STATION, "x", 1.0))
 
 
 def test_a_problem_of_a_station_selects_it_and_flies_there(placed: AppState) -> None:
@@ -167,7 +173,7 @@ def test_a_problem_of_a_station_selects_it_and_flies_there(placed: AppState) -> 
         severity=Severity.ERROR, text="cut", subject=Subject.STATION, ids=("Station 1",), place=(3.0, 5.0)
     )
     result = outcome(placed, by(OTHER, ShowProblem(problem)))
-    assert editor(result.state, OTHER).station == "Station 1"
+    assert editor(result.state, OTHER).posed == PosedKey(PosedKind.STATION, "Station 1")
     assert result.effects == (FlyTo((3.0, 5.0)),)
 
 
@@ -179,7 +185,7 @@ def test_the_table_lists_routes_and_stations_and_a_row_selects_and_flies(placed:
     assert [row.text.split("   ")[0] for row in table._shown] == [ROUTE, "Station 1"]
     assert "100 mm" in table._shown[1].text
     assert "1 of 2 reverse" in table._shown[0].text
-    assert table._selecting(1) == SelectStation("Station 1", fly=True)
+    assert table._selecting(1) == SelectPosed(PosedKey(PosedKind.STATION, "Station 1"), fly=True)
     assert table._selecting(0) == actions.SelectControlPoint(ControlPoint(ROUTE), fly=True)
     assert table._selecting(9) == page.Report("this row is gone", failed=False)
     server.stop()
@@ -193,9 +199,9 @@ def test_each_station_is_drawn_with_its_outline_and_its_accuracy(placed: AppStat
     np.testing.assert_allclose(layer._outlines.points[:, 0, :2], np.array(outline) + np.array((3.0, 5.0)), atol=1e-6)
     label = layer._labels["Station 1"]
     assert label.text == "Station 1  100 mm"
-    layer.show_site(after(placed, SetStation("required_accuracy", 0.01)).project)
+    layer.show_site(after(placed, SetPosed(PosedKind.STATION, "required_accuracy", 0.01)).project)
     assert layer._labels["Station 1"] is label
     assert label.text == "Station 1  10 mm"
-    layer.show_site(after(placed, DeleteStation()).project)
+    layer.show_site(after(placed, DeletePosed(PosedKind.STATION)).project)
     assert layer._labels == {}
     server.stop()

@@ -16,11 +16,11 @@ from commission.app.base.state import AppState
 from commission.app.base.view import PageView
 from commission.app.editing import actions
 from commission.app.editing.camera_fields import CameraFields
-from commission.app.editing.editor import Editor
+from commission.app.editing.editor import Editor, PosedKey, PosedKind
+from commission.app.editing.posed_actions import DeletePosed, MovePosed, SelectPosed, SetPosed
 from commission.app.editing.posed_gestures import heading_tip
 from commission.app.editing.route_table import RouteTable
-from commission.app.editing.site_tools import TagTool
-from commission.app.editing.tag_actions import DeleteTag, MoveTag, SelectTag, SetTag
+from commission.app.editing.site_tools import StationTool, TagTool
 from commission.app.editing.tool_hint import hint
 from commission.errors import UsageError
 from commission.site.tags import Tag
@@ -66,8 +66,8 @@ def editor(state: AppState, browser: int = ME) -> Editor:
 
 def test_a_click_places_a_tag_and_the_next_one_is_like_it(placed: AppState) -> None:
     assert tag(placed) == Tag(id="T1", x=3.0, y=5.0)
-    assert (editor(placed).tag, placed.undo[-1].name) == ("T1", "place tag T1")
-    better = after(placed, SetTag("sigma", 0.001), actions.ChooseTool(TagTool()), click(4.0, 6.0))
+    assert (editor(placed).posed, placed.undo[-1].name) == (PosedKey(PosedKind.TAG, "T1"), "place tag T1")
+    better = after(placed, SetPosed(PosedKind.TAG, "sigma", 0.001), actions.ChooseTool(TagTool()), click(4.0, 6.0))
     assert tag(better) == Tag(id="T2", x=4.0, y=6.0, sigma=0.001)
     assert after(better, page.Undo(), page.Undo(), page.Undo()).project.tags == ()
 
@@ -87,50 +87,60 @@ def test_a_tag_is_dragged_and_turned_by_its_tip_as_one_step_each(placed: AppStat
 def test_all_of_a_tag_is_typed_and_typing_is_one_step(placed: AppState) -> None:
     typed = after(
         placed,
-        SetTag("id", "dock 7"),
-        SetTag("sigma", 0.002),
-        by(ME, SetTag("sigma", 0.004), 0.4),
-        by(ME, SetTag("heading", 1.0), 0.6),
-        by(ME, SetTag("anonymous", True), 0.8),
+        SetPosed(PosedKind.TAG, "id", "dock 7"),
+        SetPosed(PosedKind.TAG, "sigma", 0.002),
+        by(ME, SetPosed(PosedKind.TAG, "sigma", 0.004), 0.4),
+        by(ME, SetPosed(PosedKind.TAG, "heading", 1.0), 0.6),
+        by(ME, SetPosed(PosedKind.TAG, "anonymous", True), 0.8),
     )
     assert tag(typed) == Tag(id="dock 7", x=3.0, y=5.0, heading=1.0, sigma=0.004, anonymous=True)
     names = ["rename tag T1", "set 1σ of the place of tag dock 7", "set heading of tag dock 7"]
     assert [step.name for step in typed.undo[1:4]] == names
-    assert editor(typed).tag == "dock 7"
+    assert editor(typed).posed == PosedKey(PosedKind.TAG, "dock 7")
     with pytest.raises(ValueError, match="sigma"):
-        after(typed, SetTag("sigma", -0.001))
+        after(typed, SetPosed(PosedKind.TAG, "sigma", -0.001))
     with pytest.raises(UsageError, match="tag id 'dock 7' is used already"):
-        after(typed, actions.ChooseTool(TagTool()), click(1.0, 6.0), SetTag("id", "dock 7"))
+        after(typed, actions.ChooseTool(TagTool()), click(1.0, 6.0), SetPosed(PosedKind.TAG, "id", "dock 7"))
 
 
 def test_keys_move_and_delete_the_selected_tag(placed: AppState) -> None:
     nudged = after(placed, actions.Nudge((0.001, -0.01)))
     assert (tag(nudged).x, tag(nudged).y) == pytest.approx((3.001, 4.99))
     gone = after(nudged, actions.DeleteSelected())
-    assert (gone.project.tags, editor(gone).tag) == ((), "")
+    assert (gone.project.tags, editor(gone).posed) == ((), None)
     with pytest.raises(UsageError, match="no tag is selected"):
-        after(gone, DeleteTag())
+        after(gone, DeletePosed(PosedKind.TAG))
 
 
 def test_a_click_selects_a_tag_and_nothing_else(placed: AppState) -> None:
     reflector = after(placed, click(0.25, 2.0))
-    assert (editor(reflector).selected, editor(reflector).tag) == (("R1",), "")
+    assert (editor(reflector).selected, editor(reflector).posed) == (("R1",), None)
     again = after(reflector, click(3.0, 5.0))
-    assert (editor(again).selected, editor(again).tag) == ((), "T1")
+    assert (editor(again).selected, editor(again).posed) == ((), PosedKey(PosedKind.TAG, "T1"))
     assert not editor(after(again, actions.Cancel())).has_selection
-    taken = after(again, by(OTHER, SelectTag("T1")), by(OTHER, DeleteTag()))
+    taken = after(again, by(OTHER, SelectPosed(PosedKey(PosedKind.TAG, "T1"))), by(OTHER, DeletePosed(PosedKind.TAG)))
     with pytest.raises(UsageError, match="no tag is selected"):
-        after(taken, MoveTag((1.0, 1.0), 0.0))
+        after(taken, MovePosed(PosedKind.TAG, (1.0, 1.0), 0.0))
+
+
+def test_a_field_of_a_station_sets_nothing_of_a_tag_that_was_selected_meanwhile(placed: AppState) -> None:
+    state = after(
+        placed, actions.ChooseTool(StationTool()), click(5.0, 5.0), SelectPosed(PosedKey(PosedKind.TAG, "T1"))
+    )
+    with pytest.raises(UsageError, match="no station is selected"):
+        after(state, SetPosed(PosedKind.STATION, "x", 9.0))
+    with pytest.raises(UsageError, match="no station is selected"):
+        after(state, DeletePosed(PosedKind.STATION))
 
 
 def test_the_table_lists_tags_and_a_row_selects_and_flies(placed: AppState) -> None:
     server = start_server("127.0.0.1", 0)
     table = RouteTable(server.gui, lambda _action: None, ME, server.gui.add_tab_group().add_tab("Routes"))
-    state = after(placed, SetTag("heading", math.pi / 2))
+    state = after(placed, SetPosed(PosedKind.TAG, "heading", math.pi / 2))
     table.draw_slowly(PageView(state=state))
     assert table._shown[-1].text == "tag T1   3.00  5.00 m  90.0°"
     asked = table._selecting(len(table._shown) - 1)
-    assert asked == SelectTag("T1", fly=True)
+    assert asked == SelectPosed(PosedKey(PosedKind.TAG, "T1"), fly=True)
     assert outcome(state, asked).effects == (FlyTo((3.0, 5.0)),)
     server.stop()
 
