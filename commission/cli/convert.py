@@ -17,7 +17,8 @@ class Convert:
     Reflectors: .csv, .tsv, .imk. Routes: VDMA LIF (.lif, .json), VDA 5050 orders (.json, read only). Floor maps: .yaml.
     Floor plans (read only): .dxf, .stl, .obj, .glb, .ply; they become a map (.yaml). A project folder gives and takes
     all of these. A recording (CSV folder, ROS bag .mcap, .db3
-    or .bag, capture .pcap or .pcapng) becomes a CSV folder, or an MCAP file (.mcap) that Foxglove and ros2 bag open.
+    or .bag, capture .pcap or .pcapng, CARMEN log) becomes a CSV folder, a bag of ROS 2 (.mcap, which Foxglove opens, or
+    .db3) or a bag of ROS 1 (.bag).
     """
 
     source: Annotated[Positional[Path], arg(metavar="IN")]

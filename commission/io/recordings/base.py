@@ -13,6 +13,7 @@ from commission.io.recordings.carmen import CarmenLog
 from commission.io.recordings.channels import NO_OPTIONS, ChannelOptions
 from commission.io.recordings.csv_folder import CsvFolder
 from commission.io.recordings.mcap_recording import McapRecording
+from commission.io.recordings.own_bag import OwnBag
 from commission.io.recordings.ros_bag import RosBag
 from commission.site.record_log import RecordLog
 from commission.site.records import Record
@@ -65,11 +66,16 @@ def _own_mcap(path: Path, options: ChannelOptions) -> Recording:
     return McapRecording(path) if options == NO_OPTIONS else RosBag(path, options)
 
 
+def _bag(path: Path, options: ChannelOptions) -> Recording:
+    """Open a bag: one that was converted here by what it says, or as any other where topics are named."""
+    return OwnBag(path) if options == NO_OPTIONS and OwnBag.recognizes(path) else RosBag(path, options)
+
+
 _FORMATS: tuple[tuple[Callable[[Path], bool], Callable[[Path, ChannelOptions], Recording]], ...] = (
     (CsvFolder.recognizes, _csv_folder),
     (Capture.recognizes, Capture),
     (McapRecording.recognizes, _own_mcap),
-    (RosBag.recognizes, RosBag),
+    (RosBag.recognizes, _bag),
     (CarmenLog.recognizes, CarmenLog),
 )
 READ = "a folder with odometry.csv, a ROS bag (.mcap, .db3, .bag), a capture (.pcap, .pcapng), or a CARMEN log"

@@ -60,6 +60,7 @@ class McapRecording(WholeRecording):
     Parameters
     ----------
     path : where it is.
+    copy : the MCAP file that is read, where that is another one; None: itself.
 
     Raises
     ------
@@ -67,9 +68,10 @@ class McapRecording(WholeRecording):
         it is damaged, or of a version that this program does not know.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, copy: Path | None = None) -> None:
         self.path = path
-        self._index: McapIndex | None = McapIndex(path)
+        self._file = path if copy is None else copy
+        self._index: McapIndex | None = McapIndex(self._file)
         self._said = self._index.metadata.get(METADATA, {})
         version = self._said.get("version")
         if version != VERSION:
@@ -120,7 +122,7 @@ class McapRecording(WholeRecording):
         takers = {DISPLACEMENTS: moved.take, REFERENCES: referred.take, TAGS: tagged.take, BEARINGS: turned.take}
         for topic, (ranges, beams), pairs in zip(topics, scans, detected, strict=True):
             takers |= {topic: ranges.take, beams_topic(topic): beams.take, detected_topic(topic): pairs.take}
-        index, self._index = self._index or McapIndex(self.path), None
+        index, self._index = self._index or McapIndex(self._file), None
         read_columns(index, takers)
         # What scans still need is in their own places.
         index.places.clear()

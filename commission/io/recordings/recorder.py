@@ -19,6 +19,7 @@ from commission.errors import FileFormatError
 from commission.geometry import se2
 from commission.io.atomic import atomic_file, cannot_write
 from commission.io.recordings import ros_encoding as ros
+from commission.io.recordings.bag_writer import MessageWriter, atomic_bag
 from commission.io.recordings.mcap_writer import McapWriter
 from commission.io.recordings.recorded_start import recorded_start_text
 from commission.io.recordings.reference_file import reference_mount_text
@@ -59,6 +60,7 @@ class Recorder:
     start : where the vehicle is said to be before the first record.
     chunk_s : what comes within this time is written at once, and lost where the program is killed before [s].
     file : an empty file to write into instead; it is not closed.
+    writer : what takes the messages instead of an MCAP file.
 
     Raises
     ------
@@ -77,6 +79,7 @@ class Recorder:
         start: RecordedStart | None = None,
         chunk_s: float = 1.0,
         file: IO[bytes] | None = None,
+        writer: MessageWriter | None = None,
     ) -> None:
         self.path = path
         self.scanners = tuple(scanners)
@@ -86,9 +89,12 @@ class Recorder:
         """Stamp of the first record [ns]; None before it."""
         self.last_ns: int | None = None
         """Latest stamp [ns]."""
-        self._is_owner = file is None
-        self._file = _opened(path) if file is None else file
-        self._writer = McapWriter(path, self._file, chunk_bytes=_CHUNK_BYTES, chunk_ns=round(chunk_s * 1e9))
+        self._opened: IO[bytes] | None = None
+        if writer is None:
+            if file is None:
+                file = self._opened = _opened(path)
+            writer = McapWriter(path, file, chunk_bytes=_CHUNK_BYTES, chunk_ns=round(chunk_s * 1e9))
+        self._writer = writer
         self._channels: dict[str, int] = {}
         self._topics = scanner_topics(self.scanners)
         self._pose = np.zeros(3)
@@ -167,8 +173,8 @@ class Recorder:
         try:
             self._writer.finish()
         finally:
-            if self._is_owner:
-                self._file.close()
+            if self._opened is not None:
+                self._opened.close()
 
     def __enter__(self) -> Recorder:
         """Return itself."""
@@ -243,6 +249,39 @@ def write_mcap(
     with atomic_file(path) as file:
         recorder = Recorder(path, scanners, truth=truth, reference_mount=reference_mount, chunk_s=_LONG_S, file=file)
         for record in records:
+            recorder.append(record)
+        recorder.close()
+
+
+def write_bag(
+    path: Path,
+    records: Iterable[Record],
+    truth: Truth | None = None,
+    *,
+    scanners: tuple[str, ...] = (ONLY_NAME,),
+    reference_mount: ReferenceMount = BASE,
+) -> None:
+    """Write a whole recording as a bag of ROS 1 (.bag) or of ROS 2 in sqlite3 (.db3); see `write_mcap`.
+
+    Parameters
+    ----------
+    path : the file, whose name ends so.
+    records : in the order of their stamps; a source's error passes through and leaves the file as it was.
+    truth : the constants of a virtual drive.
+    scanners : names of the scanners that records have indices of.
+    reference_mount : where the reference measures.
+
+    Raises
+    ------
+    FileFormatError
+        the file cannot be written, or a stamp is none that ROS can hold.
+    """
+    with atomic_bag(path) as writer:
+        recorder = Recorder(path, scanners, truth=truth, reference_mount=reference_mount, writer=writer)
+        for record in records:
+            if record.stamp_ns < 0 and writer.is_ros1:
+                found = f"cannot hold a record: its stamp is {record.stamp_ns} ns"
+                raise FileFormatError(path, "", found, "1970 or later, where the time of ROS 1 begins")
             recorder.append(record)
         recorder.close()
 

@@ -189,6 +189,17 @@ class RosbagsSource:
                 plain = data if self._is_ros1 else unpacked_message(data)
                 yield BagMessage(connection.topic, stamp, reader.deserialize(plain, connection.msgtype))
 
+    def raw_messages(self, topics: Collection[str]) -> Iterator[tuple[str, int, bytes]]:
+        """Deliver topic, time of recording [ns] and bytes, as ROS 2 has them, of messages; raises FileFormatError."""
+        store = ros2_types()
+        with _told(self.path), self._reader() as reader:
+            chosen = [connection for connection in reader.connections if connection.topic in topics]
+            for connection, stamp, data in reader.messages(connections=chosen) if chosen else ():
+                if self._is_ros1 and connection.msgtype not in store.fielddefs:
+                    learn_type(store, connection.msgtype, connection.msgdef.data)
+                whole = store.ros1_to_cdr(data, connection.msgtype) if self._is_ros1 else data
+                yield connection.topic, stamp, bytes(whole)
+
     def _reader(self) -> Any:
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
@@ -199,6 +210,28 @@ class RosbagsSource:
             # A recorder writes it when it ends; where it was stopped, the files stand alone.
             paths = _files(self.path, ".db3")
         return AnyReader(paths, default_typestore=store)
+
+
+def ros2_types() -> Typestore:
+    """Types of ROS 2: between its messages and those of ROS 1, whose headers count themselves, they translate."""
+    from rosbags.typesys import Stores, get_typestore
+
+    return get_typestore(Stores.ROS2_HUMBLE)
+
+
+def learn_type(store: Typestore, kind: str, definition: str) -> None:
+    """Make a type known, and those in it that are not.
+
+    Parameters
+    ----------
+    store : takes it.
+    kind : its name: `commission_msgs/msg/Beams`.
+    definition : what it is, in the language of ROS messages.
+    """
+    from rosbags.typesys import get_types_from_msg
+
+    types = get_types_from_msg(definition, kind)
+    store.register({name: fields for name, fields in types.items() if name not in store.fielddefs})
 
 
 def _with_suffix(path: Path, is_ros1: bool) -> Path:

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from commission.errors import UsageError
 from commission.io.overwriting import refuse_files, refuse_recording
 from commission.io.recordings.csv_writer import write_recording
-from commission.io.recordings.recorder import write_mcap
+from commission.io.recordings.recorder import write_bag, write_mcap
 from commission.site.records import Record
 from commission.site.reference_mount import BASE, ReferenceMount
 from commission.site.scanner import ONLY_NAME
 from commission.site.truth import Truth
 
 MCAP = ".mcap"
-_READ_ONLY = (".bag", ".db3", ".pcap", ".pcapng", ".log", ".clf")
-WRITTEN = "a folder for tables (odometry.csv with detections.csv or scans.npz), or a name that ends in .mcap"
+_FILES = {MCAP: write_mcap, ".db3": write_bag, ".bag": write_bag}
+"""What writes each kind of file, by the ending of its name."""
+_READ_ONLY = (".pcap", ".pcapng", ".log", ".clf")
+WRITTEN = (
+    "a folder for tables (odometry.csv with detections.csv or scans.npz), or a name that ends in .mcap or .db3 (ROS 2) "
+    "or .bag (ROS 1)"
+)
 """What a recording can be written as, in words."""
 
 
@@ -25,7 +30,7 @@ def refuse_to_write(path: Path, *, force: bool) -> None:
 
     Parameters
     ----------
-    path : folder, or file that ends in .mcap.
+    path : folder, or file that ends in .mcap, .db3 or .bag.
     force : whether a recording that is there may be replaced.
 
     Raises
@@ -35,7 +40,7 @@ def refuse_to_write(path: Path, *, force: bool) -> None:
     """
     if path.suffix.lower() in _READ_ONLY and not path.is_dir():
         raise UsageError(f"{path} ends in {path.suffix}, which is read only; expected {WRITTEN}")
-    if _is_mcap(path):
+    if _writer_of(path) is not None:
         refuse_files(path, force=force)
     else:
         refuse_recording(path, force=force)
@@ -49,7 +54,7 @@ def write_records(
     scanners: tuple[str, ...] = (ONLY_NAME,),
     reference_mount: ReferenceMount = BASE,
 ) -> None:
-    """Write a recording: as MCAP where the name ends so, else as a CSV folder.
+    """Write a recording: as MCAP or as a bag where the name ends so, else as a CSV folder.
 
     Parameters
     ----------
@@ -64,9 +69,10 @@ def write_records(
     FileFormatError
         it cannot be written, or the format cannot hold a record.
     """
-    write = write_mcap if _is_mcap(path) else write_recording
+    write = _writer_of(path) or write_recording
     write(path, records, truth, scanners=scanners, reference_mount=reference_mount)
 
 
-def _is_mcap(path: Path) -> bool:
-    return path.suffix.lower() == MCAP and not path.is_dir()
+def _writer_of(path: Path) -> Callable[..., None] | None:
+    """What writes the file of a name; None of a folder."""
+    return None if path.is_dir() else _FILES.get(path.suffix.lower())

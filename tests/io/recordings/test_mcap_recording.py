@@ -271,7 +271,7 @@ def test_csv_folder_becomes_mcap_and_mcap_the_same_csv_folder(tmp_path: Path, ca
             assert (tmp_path / "one" / name).read_text() == (tmp_path / "two" / name).read_text()
     assert run("convert", str(tmp_path / "one"), str(tmp_path / "drive.mcap")) == 2
     assert "drive.mcap exists" in capsys.readouterr().err
-    assert run("convert", str(tmp_path / "one"), str(tmp_path / "drive.bag")) == 2
+    assert run("convert", str(tmp_path / "one"), str(tmp_path / "drive.pcap")) == 2
     assert "is read only; expected a folder for tables" in capsys.readouterr().err
 
 
