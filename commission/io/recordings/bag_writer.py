@@ -39,11 +39,26 @@ class MessageWriter(Protocol):
         ...
 
     def add_channel(self, topic: str, schema: str, definition: str) -> int:
-        """Announce a topic, the type of its messages, and what the type is; returns its number."""
+        """Announce a topic; returns its number.
+
+        Parameters
+        ----------
+        topic : its name.
+        schema : name of the type of its messages.
+        definition : what the type is, in the language of ROS 2 messages.
+        """
         ...
 
     def add_message(self, channel: int, time_ns: int, data: bytes, *, compression: str = "") -> None:
-        """Add a message of a topic: when it was recorded [ns], and its bytes."""
+        """Add a message.
+
+        Parameters
+        ----------
+        channel : number of its topic.
+        time_ns : when it was recorded [ns], 0 or more.
+        data : its bytes.
+        compression : of what it is packed with: `lz4`, or nothing.
+        """
         ...
 
     def flush(self) -> None:

@@ -21,12 +21,9 @@ from commission.site.record_log import RecordLog
 from commission.site.records import Scan
 from commission.site.scanner import ONLY_NAME
 
-LOOKED_AT = 5_000
-"""Packets by which the senders of a capture are known."""
-
 
 class Capture(WholeRecording):
-    """A capture; opening it looks at its first packets for scanners."""
+    """A capture; opening it looks through its packets for scanners: one may be switched on late."""
 
     def __init__(self, path: Path, options: ChannelOptions = NO_OPTIONS) -> None:
         """Open a capture; raises FileFormatError where it holds no telegram that is read."""
@@ -82,20 +79,16 @@ class Capture(WholeRecording):
     def _timed(self, told: Counter[str]) -> Iterator[tuple[str, Timed]]:
         """Sender and scan of every telegram, with its times."""
         decoders = {name: _DECODERS[self._kinds[name]](name, told) for name in self._named}
-        for payload in payloads(self.path):
-            decoder = decoders.get(payload.sender)
-            if decoder is not None:
-                for found in decoder.take(payload.data, payload.stamp_ns):
-                    yield payload.sender, found
+        for payload in payloads(self.path, told, decoders.keys()):
+            for found in decoders[payload.sender].take(payload.data, payload.stamp_ns):
+                yield payload.sender, found
 
 
 def _senders(path: Path) -> Iterator[tuple[str, str]]:
     """Address of each sender of telegrams that are read, and the name of their kind."""
     known: dict[str, str] = {}
     begins: dict[str, bytes] = {}
-    for count, payload in enumerate(payloads(path)):
-        if count > LOOKED_AT and known:
-            return
+    for payload in payloads(path):
         if payload.sender in known:
             continue
         if payload.is_stream:

@@ -74,6 +74,7 @@ class CarmenLog(WholeRecording):
         if options != NO_OPTIONS:
             raise UsageError(f"{path} is a CARMEN log; expected --channel and --wheels for recordings with topics only")
         self.path = path
+        self._cut: str | None = None
         counts: Counter[str] = Counter()
         stamps: Growing[np.float64] = Growing(np.float64, 2)
         for line in self._lines():
@@ -110,7 +111,7 @@ class CarmenLog(WholeRecording):
                 except (ValueError, IndexError, OverflowError) as error:
                     found = f"is no {line.kind} ({error})"
                     raise FileFormatError(self.path, f"line {line.number}", found, "the numbers of CARMEN") from error
-            return collector.log(self._notes)
+            return collector.log([*self._notes, *([] if self._cut is None else [self._cut])])
         finally:
             collector.close()
 
@@ -168,7 +169,12 @@ class CarmenLog(WholeRecording):
                         found = f"is longer than {_LINE_LIMIT} bytes"
                         raise FileFormatError(self.path, f"line {number}", found, "a message of CARMEN")
                     words = data.decode("latin-1").split()
-                    if words and words[0] in _KNOWN and data.endswith(b"\n"):
+                    if not data.endswith(b"\n"):
+                        # Its last number may have lost digits, so that nobody knows whether it is whole.
+                        self._cut = (
+                            f"line {number}, the last one, has no end: the log was cut there, and it is left out"
+                        )
+                    elif words and words[0] in _KNOWN:
                         yield _line(number, words)
         except OSError as error:
             raise cannot_read(self.path, error) from error

@@ -11,6 +11,7 @@ from __future__ import annotations
 import heapq
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from os import SEEK_END
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +44,7 @@ SCANNER_COLUMN = "scanner"
 """Optional column of detections."""
 REFERENCE_COLUMNS = ("stamp_ns", "x", "y", "theta")
 
+_TABLES = (ODOMETRY, DETECTIONS, REFERENCE, TAGS, BEARINGS)
 _AT_ONCE = 1_000_000
 """Bytes of a table read at once."""
 
@@ -161,6 +163,7 @@ class CsvFolder:
                 *_mended(ODOMETRY, odometry.disordered, odometry.repeated, "one motion after the other"),
                 *_mended(REFERENCE, reference.disordered, reference.repeated, "left out but for the last of each"),
                 *_mended(DETECTIONS, late, 0, ""),
+                *filter(None, (_unended(self.path / name) for name in _TABLES)),
             ),
         )
 
@@ -242,6 +245,20 @@ def _mended(file: str, disordered: int, repeated: int, fate: str) -> Iterator[st
         yield f"{file}: {disordered} rows came after a later one and are sorted"
     if repeated:
         yield f"{file}: {repeated} rows have a stamp that is taken and are {fate}"
+
+
+def _unended(path: Path) -> str:
+    """Say that the last row of a table may be cut; empty where it is not, or there is no table."""
+    try:
+        with path.open("rb") as file:
+            if not file.seek(0, SEEK_END):
+                return ""
+            file.seek(-1, SEEK_END)
+            if file.read(1) in b"\r\n":
+                return ""
+    except OSError:
+        return ""
+    return f"{path.name}: the last line has no end; if the file was cut there, its last number may lack digits"
 
 
 def _name_in(path: Path) -> str:

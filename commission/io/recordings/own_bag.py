@@ -9,6 +9,7 @@ import json
 import shutil
 import tempfile
 import weakref
+from dataclasses import replace
 from pathlib import Path
 
 from commission.errors import FileFormatError
@@ -18,6 +19,7 @@ from commission.io.recordings.bag_writer import ABOUT, TEXT
 from commission.io.recordings.mcap_recording import McapRecording
 from commission.io.recordings.mcap_writer import McapWriter
 from commission.io.recordings.ros_source import RosbagsSource, open_bag
+from commission.site.record_log import RecordLog
 
 _CHUNK_BYTES = 4_000_000
 
@@ -42,8 +44,13 @@ class OwnBag(McapRecording):
             raise cannot_write(path, error) from error
         weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
         copy = folder / "copy.mcap"
-        _copied(path, copy)
+        self._notes = _copied(path, copy)
         super().__init__(path, copy)
+
+    def load(self) -> RecordLog:
+        """Read everything but scans into columns; raises FileFormatError."""
+        log = super().load()
+        return replace(log, notes=(*self._notes, *log.notes))
 
     @staticmethod
     def recognizes(path: Path) -> bool:
@@ -54,8 +61,8 @@ class OwnBag(McapRecording):
         )
 
 
-def _copied(path: Path, copy: Path) -> None:
-    """Write what is needed of a bag into an MCAP file."""
+def _copied(path: Path, copy: Path) -> tuple[str, ...]:
+    """Write what is needed of a bag into an MCAP file; returns what was noticed about the bag."""
     bag = RosbagsSource(path)
     about = next(iter(bag.messages({ABOUT})), None)
     try:
@@ -77,5 +84,6 @@ def _copied(path: Path, copy: Path) -> None:
                 is_scan = types[topic] in (ros.LASER_SCAN, ros.BEAMS)
                 writer.add_message(channels[topic], max(time_ns, 0), data, compression="" if is_scan else "lz4")
             writer.finish()
+        return bag.notes
     except OSError as error:
         raise cannot_write(copy, error) from error

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from commission.errors import FileFormatError, reason_of
 from commission.io.reading import cannot_read
+from commission.io.recordings.bag_parts import METADATA, files_of, missing_parts, unmerged
 from commission.io.recordings.mcap_reader import MAGIC, RECORD_LIMIT, McapChannel, McapFile
 
 if TYPE_CHECKING:
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 
 ROS1_MAGIC = b"#ROSBAG V2.0"
 SQLITE_MAGIC = b"SQLite format 3\0"
-METADATA = "metadata.yaml"
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 
 
@@ -70,7 +70,7 @@ class BagSource(Protocol):
 def is_bag(path: Path) -> bool:
     """Whether a file or folder is a ROS bag, by its first bytes (a folder by its metadata or its files)."""
     if path.is_dir():
-        return (path / METADATA).is_file() or bool(_files(path, ".mcap") or _files(path, ".db3"))
+        return (path / METADATA).is_file() or bool(files_of(path, ".mcap") or files_of(path, ".db3"))
     with path.open("rb") as file:
         begin = file.read(len(SQLITE_MAGIC))
     return begin.startswith((MAGIC, ROS1_MAGIC, SQLITE_MAGIC))
@@ -79,16 +79,11 @@ def is_bag(path: Path) -> bool:
 def open_bag(path: Path) -> BagSource:
     """Open a bag; raises FileFormatError where it is damaged or of a version that is not read."""
     if path.is_dir():
-        files = _files(path, ".mcap")
+        files = files_of(path, ".mcap")
         return McapSource(path, files) if files else RosbagsSource(path)
     with path.open("rb") as file:
         is_mcap = file.read(len(MAGIC)) == MAGIC
     return McapSource(path, [path]) if is_mcap else RosbagsSource(path)
-
-
-def _files(folder: Path, ending: str) -> list[Path]:
-    """Files of a folder in the order of their numbers: `bag_2` comes before `bag_10`."""
-    return sorted(folder.glob(f"*{ending}"), key=lambda file: (len(file.name), file.name))
 
 
 class McapSource:
@@ -98,7 +93,8 @@ class McapSource:
         """Read what the files say about their channels; one without a summary is read through."""
         self.path = path
         self.files = files
-        self._notes: list[str] = []
+        self._missing = missing_parts(path, files) if path.is_dir() else ()
+        self._cut: list[str] = []
         self._typestores: dict[tuple[str, str, str], Typestore] = {}
         found: dict[str, tuple[str, int | None]] = {}
         for file in files:
@@ -118,12 +114,12 @@ class McapSource:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Which files are cut."""
-        return tuple(self._notes)
+        """Which files are missing, and which are cut."""
+        return (*self._missing, *self._cut)
 
     def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:
         """Deliver the messages of some topics as they were written; raises FileFormatError."""
-        self._notes = []
+        self._cut = []
         for file in self.files:
             mcap = McapFile(file)
             with _told(file):
@@ -132,7 +128,7 @@ class McapSource:
                         value = self._decoded(message.channel, message.data)
                         yield BagMessage(message.channel.topic, message.log_time_ns, value)
             if mcap.is_cut:
-                self._notes.append(f"{file.name} was cut while it was recorded; it is read up to there")
+                self._cut.append(f"{file.name} was cut while it was recorded; it is read up to there")
 
     def _decoded(self, channel: McapChannel, data: bytes) -> Any:
         data = unpacked_message(data)
@@ -170,7 +166,9 @@ class RosbagsSource:
     def __init__(self, path: Path) -> None:
         """Read what the bag says about its topics."""
         self.path = path
-        self.notes: tuple[str, ...] = ()
+        files = files_of(path, ".db3", ".zstd") if path.is_dir() else [path]
+        self._missing = missing_parts(path, files) if path.is_dir() else ()
+        self.notes: tuple[str, ...] = (*self._missing, *unmerged(files))
         self._is_ros1 = path.is_file() and _begins_with(path, ROS1_MAGIC)
         with _told(path), self._reader() as reader:
             found: dict[str, tuple[str, int]] = {}
@@ -206,9 +204,11 @@ class RosbagsSource:
 
         store = get_typestore(Stores.ROS1_NOETIC if self._is_ros1 else Stores.ROS2_HUMBLE)
         paths = [_with_suffix(self.path, self._is_ros1)]
-        if self.path.is_dir() and not (self.path / METADATA).is_file():
-            # A recorder writes it when it ends; where it was stopped, the files stand alone.
-            paths = _files(self.path, ".db3")
+        files = files_of(self.path, ".db3") if self.path.is_dir() else []
+        if files and (self._missing or not (self.path / METADATA).is_file()):
+            # A recorder writes the metadata when it ends: where it was stopped, the files stand alone. By the metadata
+            # the library wants all of them.
+            paths = files
         return AnyReader(paths, default_typestore=store)
 
 
