@@ -55,6 +55,9 @@ class CoverageCommand:
     tags: bool = False
     """Whether it is also told what one frame of the camera tells by tags. Of a heading, points are positions of base;
     else of the camera."""
+    temporary: bool = False
+    """Whether it is also told how many reels of the project's disturbances, those that stand there when a drive begins,
+    a scanner that looks all round would see as temporary landmarks: where odometry does not drift."""
     force: bool = False
     """Whether files in DIR that this command did not write are overwritten; its own earlier results always are."""
 
@@ -73,6 +76,10 @@ class CoverageCommand:
             raise UsageError(f"{self.project} has no floor map; --contours expects one")
         if self.tags and not project.tags:
             raise UsageError(f"{self.project} has no tags; --tags expects some under tags: in project.yaml")
+        if self.temporary and not project.disturbances.reels:
+            raise UsageError(
+                f"{self.project} has no reels; --temporary expects some under disturbances: in project.yaml"
+            )
         try:
             result = coverage(CoverageInput.of(project, self._options()))
         except ValueError as error:
@@ -102,6 +109,7 @@ class CoverageCommand:
             with_constants=self.budget,
             with_contours=self.contours,
             with_tags=self.tags,
+            with_temporary=self.temporary,
         )
 
 
@@ -141,6 +149,7 @@ def _report(entries: dict[str, int | float | None], options: FixOptions) -> list
         f"{figure('heading_sigma_p95_rad', PLAIN_DEGREES, '.2f')}",
         *_contours(entries, share, figure),
         *_tags(entries, share, figure),
+        *_reels(entries, share),
         *_budget(entries, share, figure),
     ]
 
@@ -171,6 +180,17 @@ def _tags(
         f"{figure('tag_position_sigma_median_m', MILLIMETRES, '.1f')} median; two sigma within the limits on "
         f"{share('tag_share_within_limits')}, by reflectors or tags on "
         f"{share('share_within_limits_by_reflectors_or_tags')}"
+    ]
+
+
+def _reels(entries: dict[str, int | float | None], share: Callable[[str], str]) -> list[str]:
+    """Line about temporary landmarks, where that was asked for."""
+    if "reel_share_seen" not in entries:
+        return []
+    key = "reel_share_two_seen_without_fix"
+    more = "" if entries[key] is None else f"; where reflectors give no fix, two on {share(key)}"
+    return [
+        f"Temporary    a reel is in sight on {share('reel_share_seen')}, two on {share('reel_share_two_seen')}{more}"
     ]
 
 

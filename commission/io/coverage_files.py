@@ -73,6 +73,7 @@ def write_coverage(folder: Path, result: CoverageResult, summary: Mapping[str, f
     more = {} if result.budget is None else _budget_columns(result.budget)
     more |= {} if result.contours is None else _contour_columns(result.contours)
     more |= {} if result.tags is None else _tag_columns(result.tags)
+    more |= {} if result.reels is None else {"reels_seen": result.reels.astype(np.float64)}
     arrays |= {name: column.reshape(lattice.rows, lattice.columns) for name, column in more.items()}
     with atomic_file(folder / ARRAYS) as file:
         np.savez_compressed(file, allow_pickle=False, **arrays)

@@ -34,7 +34,7 @@ COLUMNS = (
     *(f"{part}_share" for part in CONTRIBUTIONS),
 )
 # `load` is the share of the limit: files keep the column that others read, whatever the page calls it.
-KINDS_COLUMNS = ("metre", "two_sigma_position", "two_sigma_theta", "stops", *KINDS)
+KINDS_COLUMNS = ("metre", "two_sigma_position", "two_sigma_theta", "stops", *(kind.replace(" ", "_") for kind in KINDS))
 FAILURE_COLUMNS = ("blocked", "reflector_id", "route", "failing_metres", "load", "metres")
 DEPENDENT_COLUMNS = ("reflector_id", "failure", "route", "failing_metres", "load", "metres")
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commission.compiled import warm_up
-from commission.geometry.arrays import BoolArray, FloatArray
+from commission.geometry.arrays import BoolArray, FloatArray, IntArray
 from commission.geometry.gaussian import ellipse_axes
 from commission.localization.zones import counts_at
 from commission.planning.contour_coverage import WHOLE_POSE, ContourCoverage, contour_coverage
@@ -23,11 +23,13 @@ from commission.planning.error_budget import CONTRIBUTIONS
 from commission.planning.fix_ellipses import every_nth, position_covariances
 from commission.planning.floor_budget import BudgetSite, FloorBudget, floor_budget
 from commission.planning.tag_coverage import TagCoverage, tag_coverage
+from commission.planning.temporary_coverage import reels_in_sight
 from commission.planning.vehicle_visibility import VehicleVisibility, vehicle_visibility
 from commission.planning.visibility import VisibilityOptions
 from commission.progress import Progress, part, silent
+from commission.site.disturbances import Reel
 from commission.site.floor_map import FREE, FloorMap
-from commission.site.parameters import ContourParameters, Parameters, SupervisorParameters
+from commission.site.parameters import ContourParameters, Parameters, SupervisorParameters, TemporaryParameters
 from commission.site.parts import HasFloorMap
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
@@ -85,6 +87,8 @@ class CoverageOptions:
     """Whether it is told what the contours of the floor map tell, too."""
     with_tags: bool = False
     """Whether it is told what tags tell, too."""
+    with_temporary: bool = False
+    """Whether it is told how many temporary landmarks are in sight, too."""
 
     def fix(self, parameters: Parameters, scanners: tuple[Scanner, ...], speed: float) -> FixOptions:
         """What is asked of a fix, with the noise that the localizer assumes.
@@ -145,6 +149,10 @@ class CoverageInput(StudyInput):
     """Tags of the site; None where they do not matter."""
     tag_camera: TagCamera | None = None
     """The camera that sees them; None where they do not matter."""
+    reels: tuple[Reel, ...] = ()
+    """Goods that stand in the hall; none where they do not matter."""
+    temporary: TemporaryParameters | None = None
+    """What of them is a landmark; None where they do not matter."""
 
     @staticmethod
     def of(project: Project, options: CoverageOptions | None = None) -> CoverageInput:
@@ -169,6 +177,8 @@ class CoverageInput(StudyInput):
             contours=project.parameters.contour if options.with_contours else None,
             tags=project.tags if options.with_tags else None,
             tag_camera=project.tag_camera if options.with_tags else None,
+            reels=project.disturbances.reels if options.with_temporary else (),
+            temporary=project.parameters.temporary if options.with_temporary else None,
             zones=project.zones,
         )
 
@@ -198,6 +208,8 @@ class CoverageResult:
     """What contours tell, where that was asked for and there is a map."""
     tags: TagCoverage | None = None
     """What tags tell, where that was asked for."""
+    reels: IntArray | None = None
+    """(N,) reels in sight of a scanner that looks all round, where that was asked for."""
 
 
 def coverage(inputs: CoverageInput, progress: Progress = silent) -> CoverageResult:
@@ -231,7 +243,10 @@ def coverage(inputs: CoverageInput, progress: Progress = silent) -> CoverageResu
         budget = floor_budget(found, site, part(progress, until, 1.0))
     floor = np.array(found.floor) if inputs.floor_map is None else free_floor(inputs, lattice.points())
     by_tags = tags_of(inputs, lattice, part(progress, until, 1.0))
-    return CoverageResult(coverage=found, visible=visible, drivable=floor, budget=budget, contours=told, tags=by_tags)
+    reels = reels_of(inputs, lattice, part(progress, until, 1.0))
+    return CoverageResult(
+        coverage=found, visible=visible, drivable=floor, budget=budget, contours=told, tags=by_tags, reels=reels
+    )
 
 
 def contours_of(inputs: CoverageInput, lattice: Lattice, progress: Progress = silent) -> ContourCoverage | None:
@@ -277,6 +292,20 @@ def tags_of(inputs: CoverageInput, lattice: Lattice, progress: Progress = silent
         heading_sigma=np.where(counts, found.heading_sigma, math.inf),
         in_reach=np.where(counts, found.in_reach, 0),
     )
+
+
+def reels_of(inputs: CoverageInput, lattice: Lattice, progress: Progress = silent) -> IntArray | None:
+    """(N,) reels that would be temporary landmarks from each point; zones switch them off nowhere. None if nobody asks.
+
+    Parameters
+    ----------
+    inputs : the site and what is asked.
+    lattice : the points.
+    progress : told how far it is; may raise to cancel.
+    """
+    if inputs.temporary is None:
+        return None
+    return reels_in_sight(inputs.reels, inputs.temporary, inputs.scanners, inputs.floor_map, lattice, progress)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -350,6 +379,8 @@ def summary(result: CoverageResult, limits: SupervisorParameters) -> dict[str, N
         entries |= _contour_entries(result, result.contours, limits)
     if result.tags is not None:
         entries |= _tag_entries(result, result.tags, limits)
+    if result.reels is not None:
+        entries |= _reel_entries(result, result.reels)
     return entries | ({} if result.budget is None else _budget_entries(result.budget, on))
 
 
@@ -379,6 +410,18 @@ def _tag_entries(result: CoverageResult, tags: TagCoverage, limits: SupervisorPa
         "tag_position_sigma_median_m": _quantile(tags.position_sigma[on], 0.5),
         "tag_position_sigma_p95_m": _quantile(tags.position_sigma[on], 0.95),
         "share_within_limits_by_reflectors_or_tags": _mean((within | within_limits(result.coverage, limits))[on]),
+    }
+
+
+def _reel_entries(result: CoverageResult, reels: IntArray) -> dict[str, Number]:
+    """Where odometry would not drift: one reel tells a direction and a distance, two the whole motion."""
+    on = result.drivable
+    none_fixed = on & ~np.isfinite(result.coverage.fixes.position_sigma)
+    return {
+        "reels_seen_mean": _mean(reels[on].astype(np.float64)),
+        "reel_share_seen": _mean(reels[on] > 0),
+        "reel_share_two_seen": _mean(reels[on] > 1),
+        "reel_share_two_seen_without_fix": _mean(reels[none_fixed] > 1),
     }
 
 

@@ -29,7 +29,7 @@ from commission.site.quantity import DEGREES, MILLIMETRES, PERCENT
 from commission.studies.bearing_figures import leaning
 from commission.studies.curves import longest_regular
 from commission.studies.inputs import StudyInput
-from commission.studies.kinds import corrected_by
+from commission.studies.kinds import OF_THE_MAP, corrected_by
 from commission.studies.reflector_figures import numbered
 from commission.studies.run import RunResult, limits_along
 
@@ -205,9 +205,9 @@ def _searches(run: RunResult, cycle: int) -> bool:
 
 
 def _blind(run: RunResult) -> Iterator[RunEvent]:
-    """Stretches in which nothing was accepted, of whatever kind."""
+    """Stretches in which nothing that is on the map was accepted, of whatever kind."""
     stamps, means = run.columns.stamps_ns, run.columns.means
-    others = np.any(corrected_by(run.columns)[:, 1:], axis=1)
+    others = np.any(corrected_by(run.columns)[:, OF_THE_MAP][:, 1:], axis=1)
     for first, after in stretches_of((run.counts[:, Status.INLIER] == 0) & np.logical_not(others)).tolist():
         # From the last scan with an accepted detection to the next one with one.
         begin, end = max(first - 1, 0), min(after, len(stamps) - 1)

@@ -1,4 +1,4 @@
-"""What the filter will say along a route by all that corrects it: walls, tags and bearings as well as reflectors.
+"""What the filter will say along a route by all that corrects it: walls, tags, bearings and goods beside reflectors.
 
 `prediction` goes by ranges and bearings of reflectors, in closed form and quickly. Other kinds depend on whole scans
 and on where a camera looks, so that here the route is driven a few times in a virtual hall without people or faults.
@@ -18,7 +18,7 @@ from commission.localization.supervisor import position_two_sigma
 from commission.localization.whole_run import run
 from commission.progress import Progress, part, silent
 from commission.simulation.scenario import start_of, virtual_drive
-from commission.site.disturbances import Disturbances, WheelNoise
+from commission.site.disturbances import Disturbances, Reel, WheelNoise
 from commission.site.floor_map import FloorMap
 from commission.site.parameters import Parameters
 from commission.site.project import Project
@@ -31,10 +31,12 @@ from commission.site.uncertainty import Uncertainty
 from commission.site.vehicle import Vehicle
 from commission.site.zones import Zone
 from commission.studies.inputs import StudyInput
-from commission.studies.kinds import BEARINGS, CONTOURS, REFLECTORS, TAGS, corrected_by
+from commission.studies.kinds import BEARINGS, CONTOURS, KINDS, REFLECTORS, TAGS, TEMPORARY, corrected_by
 
 DRIVES = 3
 """Drives whose covariances are averaged: which beams and bearings pass a gate is chance, and little depends on it."""
+FIGURES = 6
+"""Of a metre, before the cycles that each kind corrects: 2-sigma of position and heading, three variances, stops."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -61,6 +63,8 @@ class KindsInput(StudyInput):
     """How well the constants of the site and the vehicle are known."""
     wheels: WheelNoise
     """True noise of the wheels."""
+    reels: tuple[Reel, ...]
+    """Goods that stand in the virtual hall, come and go."""
     route: Route
     """What is driven."""
 
@@ -89,6 +93,7 @@ class KindsInput(StudyInput):
             parameters=project.parameters,
             uncertainty=project.uncertainty,
             wheels=project.disturbances.wheels,
+            reels=project.disturbances.reels if project.parameters.temporary.enabled else (),
             route=project.route(route),
         )
 
@@ -104,7 +109,7 @@ class KindsInput(StudyInput):
             zones=self.zones,
             parameters=self.parameters,
             uncertainty=self.uncertainty,
-            disturbances=Disturbances(wheels=self.wheels),
+            disturbances=Disturbances(wheels=self.wheels, reels=self.reels),
             routes=(self.route,),
         )
 
@@ -131,7 +136,7 @@ class KindsPrediction:
     stops: FloatArray
     """(B,) share of the drives that the supervisor stops in the metre [0..1]."""
     corrections: FloatArray
-    """(B, 4) cycles of the metre in which each of `KINDS` corrects the pose, as the mean of the drives."""
+    """(B, 5) cycles of the metre in which each of `KINDS` corrects the pose, as the mean of the drives."""
 
 
 def kinds_beside_ranges(project: Project | KindsInput) -> tuple[str, ...]:
@@ -142,10 +147,14 @@ def kinds_beside_ranges(project: Project | KindsInput) -> tuple[str, ...]:
     project : the site.
     """
     parameters = project.parameters
+    temporary = parameters.temporary
+    reels = project.reels if isinstance(project, KindsInput) else project.disturbances.reels
+    has_goods = bool(reels) or (temporary.corners and project.floor_map is not None)
     there = {
         CONTOURS: parameters.contour.enabled and project.floor_map is not None,
         TAGS: parameters.tag.enabled and bool(project.tags),
         BEARINGS: parameters.bearing.enabled and any(each.is_goniometer for each in project.scanners),
+        TEMPORARY: temporary.enabled and temporary.most > 0 and has_goods,
     }
     return tuple(kind for kind, is_there in there.items() if is_there)
 
@@ -169,7 +178,7 @@ def kinds_prediction(inputs: KindsInput, progress: Progress = silent) -> KindsPr
     progress(1.0, "driving")
     known = np.unique(np.concatenate([metre for metre, _, _ in rows]))
     # A metre that one drive has no cycle in, as a vehicle is fast or the last metre short, is the mean of the others.
-    table = np.full((DRIVES, len(known), 10), np.nan)
+    table = np.full((DRIVES, len(known), FIGURES + len(KINDS)), np.nan)
     for number, (metre, figures, _) in enumerate(rows):
         table[number, np.searchsorted(known, metre)] = figures
     mean = np.nanmean(table, axis=0)
@@ -183,7 +192,7 @@ def kinds_prediction(inputs: KindsInput, progress: Progress = silent) -> KindsPr
         heading=read_only(mean[:, 1]),
         variances=read_only(mean[:, 2:5]),
         stops=read_only(mean[:, 5]),
-        corrections=read_only(mean[:, 6:]),
+        corrections=read_only(mean[:, FIGURES:]),
     )
 
 
@@ -201,7 +210,7 @@ def metres_of(columns: RunColumns, log: RecordLog) -> tuple[FloatArray, float]:
 
 
 def _per_metre(columns: RunColumns, metres: FloatArray, parameters: Parameters) -> tuple[IntArray, FloatArray]:
-    """(B,) metres of a drive and (B, 10) its figures in each, in the order of `KindsPrediction`."""
+    """(B,) metres of a drive and (B, 11) its figures in each, in the order of `KindsPrediction`."""
     metre, first = np.unique(metres.astype(np.int64), return_index=True)
     counts = np.diff(np.append(first, len(metres)))[:, np.newaxis]
     variances = np.diagonal(columns.covariances, axis1=1, axis2=2)

@@ -490,6 +490,7 @@ FIGURES = {
     Figure.CONTOUR_HEADING: (0.0123, "0.705°"),
     Figure.TAG_POSITION: (0.0229, "22.9 mm"),
     Figure.TAG_HEADING: (0.0123, "0.705°"),
+    Figure.REELS: (4.0, "4"),
     Figure.POSITION_DOP: (1.23, "1.23"),
     Figure.HEADING_DOP: (0.456, "0.456"),
     Figure.EXPECTED_VISIBLE: (2.5, "2.5"),

@@ -1,11 +1,14 @@
 """The command `coverage`."""
 
+import dataclasses
 import json
 import re
 
 import numpy as np
 import pytest
 
+from commission.io.project_file import load_project, save_project
+from commission.site.disturbances import Reel
 from tests.conftest import REPOSITORY
 
 
@@ -147,3 +150,23 @@ def test_what_tags_tell_is_written_and_told(commission, tmp_path):
     code, _, err = commission("coverage", REPOSITORY / "maps" / "laboratory", "--out", tmp_path / "none", "--tags")
     assert code == 2
     assert "has no tags; --tags expects some under tags:" in err
+
+
+def test_how_many_temporary_landmarks_are_in_sight_is_written_and_told(commission, tmp_path):
+    site = load_project(REPOSITORY / "maps" / "laboratory")
+    reels = (Reel(x=3.0, y=3.0, radius=0.4), Reel(x=6.0, y=3.0, radius=0.4))
+    stocked = dataclasses.replace(site, disturbances=dataclasses.replace(site.disturbances, reels=reels))
+    save_project(stocked, tmp_path / "stocked")
+    options = ("--spacing", "0.25", "--temporary")
+    code, told, err = commission("coverage", tmp_path / "stocked", "--out", tmp_path / "out", *options)
+    assert (code, err) == (0, "")
+    entries = summary(tmp_path / "out")
+    with np.load(tmp_path / "out" / "coverage.npz") as found:
+        seen = found["reels_seen"][found["drivable"]]
+    assert 0.0 < (seen > 1).mean() < (seen > 0).mean() < 1.0
+    assert entries["reel_share_seen"] == pytest.approx((seen > 0).mean())
+    assert entries["reel_share_two_seen"] == pytest.approx((seen > 1).mean())
+    assert f"Temporary    a reel is in sight on {100.0 * (seen > 0).mean():.1f} %" in told
+    code, _, err = commission("coverage", REPOSITORY / "maps" / "laboratory", "--out", tmp_path / "none", "--temporary")
+    assert code == 2
+    assert "has no reels; --temporary expects some under disturbances:" in err

@@ -1,4 +1,4 @@
-"""What is predicted by walls, tags and bearings is what drives show, metre by metre, and how far off they are."""
+"""What is predicted by walls, tags, bearings and goods is what drives show, metre by metre, and how far they are off."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from commission.localization.estimate import Belief
 from commission.localization.setup import LocalizerSetup
 from commission.localization.whole_run import run
 from commission.simulation.scenario import start_of, virtual_drive
+from commission.site.disturbances import Reel
 from commission.site.parameters import OdometryParameters
 from commission.studies.kinds import KINDS, corrected_by
 from commission.studies.kinds_prediction import KindsInput, kinds_beside_ranges, kinds_prediction, metres_of
@@ -18,10 +19,17 @@ from commission.studies.metrics import pose_errors, reference_at
 from tests.acceptance.test_every_kind import ROUTE, project_of
 from tests.conftest import Seeds, few_of
 
+AMONG_GOODS = "reflectors and corners that are remembered"
+BESIDE = {"contours": "contours", "tags": "tags", "bearings": "bearings", AMONG_GOODS: "temporary landmarks"}
+"""What corrects the pose in each project of the battery besides ranges and bearings of reflectors."""
+REELS = (Reel(x=2.2, y=2.0, radius=0.4), Reel(x=5.0, y=6.4, radius=0.4), Reel(x=9.0, y=4.0, radius=0.4))
+
 
 def consistent(kind: str):
     """A project whose filter takes the wheels, and the walls of a virtual hall, for what they are."""
     project = project_of(kind)
+    if kind == AMONG_GOODS:
+        project = dataclasses.replace(project, disturbances=dataclasses.replace(project.disturbances, reels=REELS))
     wheels = dataclasses.asdict(project.disturbances.wheels)
     names = {field.name for field in dataclasses.fields(OdometryParameters)} & wheels.keys()
     odometry = dataclasses.replace(project.parameters.odometry, **{name: wheels[name] for name in names})
@@ -30,13 +38,14 @@ def consistent(kind: str):
     return dataclasses.replace(project, parameters=parameters)
 
 
-@pytest.mark.parametrize("kind", few_of(["contours", "tags", "bearings"], ["tags"]))
+@pytest.mark.parametrize("kind", few_of(list(BESIDE), ["tags"]))
 def test_predicted_sigma_is_what_drives_with_all_constants_drawn_are_off(kind: str, seeds: Seeds) -> None:
     project = consistent(kind)
-    assert kinds_beside_ranges(project) == (kind,)
+    assert kinds_beside_ranges(project) == (BESIDE[kind],)
     found = kinds_prediction(KindsInput.of(project, ROUTE))
     # By each kind of which there is none, nothing is corrected.
-    assert [name for name, some in zip(KINDS, found.corrections.any(axis=0), strict=True) if some] == [kind]
+    there = {BESIDE[kind], *(["reflectors"] if kind == AMONG_GOODS else [])}
+    assert {name for name, some in zip(KINDS, found.corrections.any(axis=0), strict=True) if some} == there
     assert not found.stops.any()
     start, setup, squares = start_of(project, ROUTE), LocalizerSetup.of(project), []
     for seed in seeds(6, 60):

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from commission.app.coverage.settings import BY_CONTOURS, BY_TAGS, Figure
-from commission.geometry.arrays import BoolArray, FloatArray
+from commission.app.coverage.settings import Figure
+from commission.geometry.arrays import BoolArray, FloatArray, IntArray
 from commission.planning import coverage as coverage_kernels
 from commission.planning.contour_coverage import ContourCoverage
 from commission.planning.coverage import LiveCoverage
@@ -36,29 +36,32 @@ class Covered:
     """What contours tell, where it is asked for and there is a floor map."""
     tags: TagCoverage | None = None
     """What tags tell, where it is asked for."""
+    reels: IntArray | None = None
+    """(N,) temporary landmarks in sight, where it is asked for."""
 
     def values(self, figure: Figure) -> FloatArray:
         """(N,) a figure of the floor, SI; infinite where it is not known."""
-        nothing = np.full(len(self.floor), math.inf)
-        if figure is Figure.TOTAL_SIGMA:
-            return nothing if self.budget is None else self.budget.sigma
-        if figure is Figure.CONTOUR_POSITION:
-            return nothing if self.contours is None else self.contours.position_sigma
-        if figure is Figure.CONTOUR_HEADING:
-            return nothing if self.contours is None else self.contours.heading_sigma
-        if figure is Figure.TAG_POSITION:
-            return nothing if self.tags is None else self.tags.position_sigma
-        if figure is Figure.TAG_HEADING:
-            return nothing if self.tags is None else self.tags.heading_sigma
-        return getattr(self.live.coverage.fixes, figure.value)
+        beside = self._beside_fixes()
+        if figure not in beside:
+            return getattr(self.live.coverage.fixes, figure.value)
+        found = beside[figure]
+        return np.full(len(self.floor), math.inf) if found is None else found
 
     def has(self, figure: Figure) -> bool:
         """Whether a figure was computed."""
-        if figure is Figure.TOTAL_SIGMA:
-            return self.budget is not None
-        if figure in BY_TAGS:
-            return self.tags is not None
-        return self.contours is not None if figure in BY_CONTOURS else True
+        return self._beside_fixes().get(figure, self.floor) is not None
+
+    def _beside_fixes(self) -> dict[Figure, FloatArray | None]:
+        """Figures that are not of a fix by reflectors; None where they were not asked for."""
+        contours, tags = self.contours, self.tags
+        return {
+            Figure.TOTAL_SIGMA: None if self.budget is None else self.budget.sigma,
+            Figure.CONTOUR_POSITION: None if contours is None else contours.position_sigma,
+            Figure.CONTOUR_HEADING: None if contours is None else contours.heading_sigma,
+            Figure.TAG_POSITION: None if tags is None else tags.position_sigma,
+            Figure.TAG_HEADING: None if tags is None else tags.heading_sigma,
+            Figure.REELS: None if self.reels is None else self.reels.astype(np.float64),
+        }
 
     def follow(self, before: CoverageInput, now: CoverageInput) -> bool:
         """Move the reflectors that were moved, where nothing else is different.
@@ -96,7 +99,14 @@ def cover(inputs: CoverageInput, progress: Progress) -> Covered:
     progress(0.95, "compiling moved reflectors")
     coverage_kernels.warm_up()
     live = LiveCoverage(found.visible, found.coverage)
-    return Covered(live=live, floor=found.drivable, budget=found.budget, contours=found.contours, tags=found.tags)
+    return Covered(
+        live=live,
+        floor=found.drivable,
+        budget=found.budget,
+        contours=found.contours,
+        tags=found.tags,
+        reels=found.reels,
+    )
 
 
 def changed_reflectors(before: ReflectorMap, after: ReflectorMap) -> list[int] | None:

@@ -54,6 +54,7 @@ QUANTITIES: dict[Figure, ShownFigure] = {
     Figure.CONTOUR_HEADING: ShownFigure(label="Contours: heading error, 1σ [°]", shown=DEGREES),
     Figure.TAG_POSITION: ShownFigure(label="Tags: position error, 1σ [mm]", shown=MILLIMETRES),
     Figure.TAG_HEADING: ShownFigure(label="Tags: heading error, 1σ [°]", shown=DEGREES),
+    Figure.REELS: ShownFigure(label="Reels as temporary landmarks", bounds=COUNTS, more_is_better=True),
     Figure.POSITION_DOP: ShownFigure(label="Position dilution (DOP)"),
     Figure.HEADING_DOP: ShownFigure(label="Heading dilution (DOP)"),
     Figure.EXPECTED_VISIBLE: ShownFigure(
@@ -103,8 +104,8 @@ class Scale:
 
 
 def is_fix(figure: Figure, values: ArrayLike) -> BoolArray:
-    """Whether there is something to show: a fix, or for counts at least one reflector."""
-    return np.asarray(values) > 0.0 if figure is Figure.VISIBLE else np.isfinite(values)
+    """Whether there is something to show: a fix, or for counts at least one reflector or reel."""
+    return np.asarray(values) > 0.0 if figure in {Figure.VISIBLE, Figure.REELS} else np.isfinite(values)
 
 
 def scale_for(figure: Figure, values: FloatArray) -> Scale:

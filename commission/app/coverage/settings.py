@@ -37,6 +37,8 @@ class Figure(StrEnum):
     """By tags; of no fix, either."""
     TAG_HEADING = "tag_heading"
     """The same of the heading."""
+    REELS = "reels"
+    """Temporary landmarks; of no fix, either."""
     POSITION_DOP = "position_dop"
     HEADING_DOP = "heading_dop"
     EXPECTED_VISIBLE = "expected_visible"
@@ -92,6 +94,7 @@ class CoverageSettings:
             with_constants=self.figure is Figure.TOTAL_SIGMA,
             with_contours=self.figure in BY_CONTOURS,
             with_tags=self.figure in BY_TAGS,
+            with_temporary=self.figure is Figure.REELS,
         )
 
 

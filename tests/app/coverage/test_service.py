@@ -15,6 +15,7 @@ from commission.app.coverage.settings import CoverageSettings, Figure
 from commission.app.editing.editor import Drag, Editor, Grab, Snapping
 from commission.planning.dilution import Heading, Measurement
 from commission.progress import silent
+from commission.site.disturbances import Disturbances, Reel
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
 from commission.site.tags import Tag
@@ -116,6 +117,18 @@ def test_what_tags_tell_is_that_of_its_study(project: Project) -> None:
     assert np.array_equal(heat.classes.ravel(), heat.scale.classes(result.tags.position_sigma, result.drivable))
     index = result.coverage.lattice.index_near(2.0, 2.0)
     assert bench.view.reading.values[Figure.TAG_HEADING] == result.tags.heading_sigma[index] < 0.1
+    bench.close()
+
+
+def test_how_many_reels_are_in_sight_is_that_of_its_study(project: Project) -> None:
+    stocked = replace(project, disturbances=Disturbances(reels=(Reel(x=3.0, y=3.0, radius=0.5),)))
+    bench = Bench(CoverageService, stocked)
+    bench.ask(SetCoverage("figure", "reels"), ReadFloor((1.5, 2.0), 0.01))
+    heat = bench.found().heat
+    result = coverage(CoverageInput.of(stocked, CoverageSettings(figure=Figure.REELS).options(Conditions())))
+    assert result.reels is not None
+    assert np.array_equal(heat.classes.ravel(), heat.scale.classes(result.reels.astype(float), result.drivable))
+    assert bench.view.reading.values[Figure.REELS] == 1.0
     bench.close()
 
 
