@@ -1,4 +1,4 @@
-"""What is predicted by walls, tags, bearings and goods is what drives show, metre by metre, and how far they are off."""
+"""What is predicted by walls, tags, bearings and goods is what drives show metre by metre, and how far they are off."""
 
 from __future__ import annotations
 
