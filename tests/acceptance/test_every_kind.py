@@ -1,6 +1,7 @@
 """What every observation kind has to keep, alone and all together: one battery over drives through one small room.
 
-Residuals, Jacobians by finite differences and degenerate geometry of each kind are tested by its own file.
+Finite differences and degenerate geometry are tried from outside, by what a cycle makes of a pose; the residuals and
+Jacobians of each kind, row by row, are tested by its own file besides.
 """
 
 # pyright: basic
@@ -8,6 +9,8 @@ Residuals, Jacobians by finite differences and degenerate geometry of each kind 
 from __future__ import annotations
 
 import dataclasses
+import itertools
+import math
 
 import numpy as np
 import pytest
@@ -20,17 +23,19 @@ from commission.localization.growing_run import GrowingRun
 from commission.localization.setup import LocalizerSetup
 from commission.localization.whole_run import run
 from commission.simulation.scenario import start_of, virtual_drive
-from commission.site.disturbances import ConstantErrors, Disturbances
+from commission.site.disturbances import ConstantErrors, Disturbances, Reel, WheelNoise
 from commission.site.floor_map import FREE
-from commission.site.parameters import ContourParameters, Parameters, TemporaryParameters
+from commission.site.parameters import ContourParameters, FilterParameters, Parameters, TemporaryParameters
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Route, Segment
 from commission.site.scanner import Scanner, ScannerKind
 from commission.site.tags import Tag, TagCamera
+from commission.studies.kinds import KINDS as KINDS_SEEN
+from commission.studies.kinds import TEMPORARY, corrected_by
 from commission.studies.metrics import pose_errors, reference_at
 from tests.conftest import Seeds, few_of
-from tests.localization.contour_halls import room
+from tests.localization.contour_halls import corridor, room
 
 ROUTE = "Through"
 POSTS = tuple(
@@ -72,7 +77,12 @@ def project(request: pytest.FixtureRequest) -> Project:
 
 
 def project_of(kind: str) -> Project:
-    posts, tags, parameters, scanners = KINDS[kind]
+    return made_of(KINDS[kind])
+
+
+def made_of(given) -> Project:
+    """A project with posts, tags, parameters and scanners."""
+    posts, tags, parameters, scanners = given
     segment = Segment(control_points=np.array(((3.0, 3.0), (4.0, 3.2), (5.5, 4.2), (6.5, 4.5))), degree=3)
     return Project(
         floor_map=room(origin=(0.4, -0.3, 0.1)),
@@ -160,6 +170,110 @@ def test_errors_are_as_large_as_the_filter_says_with_all_constants_drawn(project
     print(f"ANEES {np.mean(nees) / 3.0:.2f}")  # noqa: T201 - README
     # Constants stay for a whole drive: chi-square with 3 degrees of freedom for each is the least that is averaged.
     assert np.mean(nees) / 3.0 < chi2.ppf(0.999, 3 * len(nees)) / (3 * len(nees))
+
+
+def exact(project: Project) -> Project:
+    """The project with sensors and wheels without noise, of which the filter does not know, and without constants."""
+    scanners = (dataclasses.replace(each, sweep_duration=0.0, range_sigma=0.0) for each in project.scanners)
+    return dataclasses.replace(
+        project,
+        scanners=tuple(scanners),
+        parameters=dataclasses.replace(project.parameters, filter=FilterParameters(consider=False)),
+        disturbances=Disturbances(wheels=WheelNoise(**{each.name: 0.0 for each in dataclasses.fields(WheelNoise)})),
+    )
+
+
+def test_a_cycle_turns_an_error_of_the_pose_into_what_its_covariance_says(project):
+    """Finite differences over a whole cycle: d posterior / d prior = I - K H, and P after it = (I - K H) P before."""
+    site = exact(project)
+    log, setup, start = virtual_drive(site, ROUTE, seed=4), LocalizerSetup.of(site), start_in(site)
+    columns, off = run(log, setup, start), []
+    corrected = corrected_by(columns) & (columns.stamps_ns > 500_000_000)[:, np.newaxis]
+    # A match of contours steps with the cells of its table.
+    step = 2e-3 if setup.contour else 1e-4
+    for cycle in np.unique(np.concatenate([np.flatnonzero(by)[::9][:5] for by in corrected.T])):
+        # The vehicle moves by a little more in the last odometry before the cycle: what it remembers stays.
+        row = int(np.searchsorted(log.odometry_stamps_ns, columns.stamps_ns[cycle])) - 1
+        prior, posterior = np.zeros((3, 3)), np.zeros((3, 3))
+        for axis, by in itertools.product(range(3), (-step, step)):
+            moves = log.displacements.copy()
+            moves[row, axis] += by
+            changed = run(dataclasses.replace(log, displacements=moves), setup, start)
+            prior[:, axis] += math.copysign(1.0, by) * changed.priors.at(cycle)[0]
+            posterior[:, axis] += math.copysign(1.0, by) * changed.means[cycle]
+        P = columns.priors.at(cycle)[1]
+        whiten = np.linalg.cholesky(np.linalg.inv(P))
+        expected = posterior @ np.linalg.inv(prior) @ P
+        off.append(np.abs(whiten.T @ (expected - columns.covariances[cycle]) @ whiten).max())
+    # What is left is curvature, by the noise of a camera and the cells of a map.
+    assert np.median(off) < 0.05
+    assert max(off) < 0.2
+
+
+def around(post: Reflector):
+    """Motion of a pose that one reflector's range and bearing do not tell: around it, turning along."""
+    return lambda pose: [(-(pose[1] - post.y), pose[0] - post.x, 1.0)]
+
+
+def around_and_towards(post: Reflector):
+    """What one bearing does not tell: that, and the way from the goniometer to the reflector."""
+
+    def motions(pose):
+        x, y, _ = se2.compose(pose, GONIOMETER.mounting)
+        return [*around(post)(pose), (post.x - x, post.y - y, 0.0)]
+
+    return motions
+
+
+UNTOLD = {
+    "one reflector": ((POSTS[:1], (), Parameters(), (LASER,)), room(origin=(0.4, -0.3, 0.1)), around(POSTS[0])),
+    "one bearing": (
+        (POSTS[:1], (), Parameters(), (GONIOMETER,)),
+        room(origin=(0.4, -0.3, 0.1)),
+        around_and_towards(POSTS[0]),
+    ),
+    "the walls of a corridor": (
+        ((), (), CONTOURS, (dataclasses.replace(LASER, range=(0.05, 15.0)),)),
+        corridor(length=60.0, width=3.0),
+        lambda _pose: [(1.0, 0.0, 0.0)],
+    ),
+}
+"""Of each kind a site that leaves something untold, and the motions of the pose that change nothing that is seen."""
+
+
+@pytest.mark.parametrize("kind", UNTOLD)
+def test_what_a_kind_cannot_tell_is_not_taken_for_known(kind):
+    """Information about a motion that changes nothing stays what it was before the cycle: n' (P+^-1 - P-^-1) n = 0."""
+    given, floor, motions = UNTOLD[kind]
+    along = Segment(control_points=np.array(((27.0, 1.6), (29.0, 1.7), (31.0, 1.5), (33.0, 1.6))), degree=3)
+    site = dataclasses.replace(exact(made_of(given)), floor_map=floor)
+    if kind == "the walls of a corridor":
+        site = dataclasses.replace(site, routes=(Route(ROUTE, speed=0.8, segments=(along,)),))
+    columns = run(virtual_drive(site, ROUTE, seed=5), LocalizerSetup.of(site), start_in(site))
+    cycles = np.flatnonzero(corrected_by(columns).any(axis=1))
+    assert len(cycles) > 10
+    for cycle in cycles:
+        pose, before = columns.priors.at(cycle)
+        gained = np.linalg.inv(columns.covariances[cycle]) - np.linalg.inv(before)
+        for motion in motions(pose):
+            n = np.array(motion)
+            assert abs(n @ gained @ n) < 1e-3 * (n @ np.linalg.inv(before) @ n)
+        assert np.linalg.eigvalsh(gained).max() > 1e-3 * np.linalg.eigvalsh(np.linalg.inv(before)).max()
+
+
+def test_goods_that_nobody_has_surveyed_never_make_a_pose_better_known_than_where_it_began():
+    """Temporary landmarks: P >= F P0 F', where F carries an error of the start along."""
+    site = exact(made_of(((), (), CORNERS, (LASER,))))
+    reels = (Reel(x=2.2, y=2.0, radius=0.4), Reel(x=5.0, y=6.4, radius=0.4), Reel(x=9.0, y=4.0, radius=0.4))
+    site = dataclasses.replace(site, disturbances=dataclasses.replace(site.disturbances, reels=reels))
+    columns, start = run(virtual_drive(site, ROUTE, seed=6), LocalizerSetup.of(site), start_in(site)), start_in(site)
+    corrected = corrected_by(columns)
+    assert corrected[:, KINDS_SEEN.index(TEMPORARY)].sum() > 10
+    for mean, covariance in zip(columns.means, columns.covariances, strict=True):
+        dx, dy, _ = mean - start.mean
+        F = np.array(((1.0, 0.0, -dy), (0.0, 1.0, dx), (0.0, 0.0, 1.0)))
+        least = np.linalg.eigvalsh(covariance - F @ start.covariance @ F.T).min()
+        assert least > -0.02 * np.linalg.eigvalsh(start.covariance).max()
 
 
 def elsewhere(project: Project, rng: np.random.Generator) -> np.ndarray:
