@@ -7,7 +7,7 @@
 (() => {
   if (window.commissionEntries) return; // the server sends this script again after each reconnection
   window.commissionEntries = true;
-  const FIELDS = ".mantine-NumberInput-input, .mantine-TextInput-input, .mantine-Textarea-input";
+  const FIELDS = ".mantine-NumberInput-input, .mantine-TextInput-input, .mantine-Textarea-input, input.c-cell";
   const STEPS = new Set(["ArrowUp", "ArrowDown", "ArrowLeft", "ArrowRight", "PageUp", "PageDown", "Home", "End"]);
   const SAID_FOR_MS = 20_000;
   // A message of over 4 MB would end the connection without a word. Of a longer text goes so much that the server
@@ -81,7 +81,10 @@
 
   // What the widget is to hold: of several numbers the one that was typed in is exchanged.
   function meantBy({ input, field, said }) {
-    if (!isNumber(input)) return input.value.slice(0, ENOUGH_LETTERS);
+    const text = input.value.slice(0, ENOUGH_LETTERS);
+    // A cell of a table says, too, which one it is (site_tables.js).
+    if (input.dataset.says) return JSON.stringify({ ...JSON.parse(input.dataset.says), text });
+    if (!isNumber(input)) return text;
     const inputs = [...field.querySelectorAll(FIELDS)];
     if (inputs.length === 1) return numberIn(input.value);
     const numbers = [...(said ?? inputs.map((each) => numberIn(each.value)))];
@@ -151,12 +154,18 @@
 
   function refuse(field, text) {
     field.dataset.refused = text;
-    setTimeout(() => { if (field.dataset.refused === text) delete field.dataset.refused; }, SAID_FOR_MS);
+    window.commissionRefuseCell?.(field, text);
+    setTimeout(() => {
+      if (field.dataset.refused !== text) return;
+      delete field.dataset.refused;
+      window.commissionRefuseCell?.(field, "");
+    }, SAID_FOR_MS);
   }
   window.commissionRefuse = (uuid, text) => {
-    const field = document.querySelector(`label[for="${CSS.escape(uuid)}"]`)?.closest(".mantine-Flex-root");
+    const entry = sent.get(uuid), isCell = entry?.input.dataset.says;
+    const field = isCell ? entry.field
+      : document.querySelector(`label[for="${CSS.escape(uuid)}"]`)?.closest(".mantine-Flex-root");
     if (!field) return;
-    const entry = sent.get(uuid);
     sent.delete(uuid);
     if (entry && draft?.uuid !== uuid) restore(entry); // what was refused does not stay
     refuse(field, text);

@@ -4,15 +4,11 @@
   if (window.commissionTables || !window.commissionPlots) return; // the server sends this script again
   window.commissionTables = true;
   const { ask, seek, views, body, panel, listeners, chips, showChips } = window.commissionPlots;
+  const { make, whole, row, head: headOf } = window.commissionTable;
   const COLORS = { fail: "#ff5252", lost: "#ff5252", recovered: "#40c898" };
   let compared = null; // variants
   let found = null, hidden = new Set(), sorted = { column: 0, isDown: false };
 
-  const make = (tag, properties = {}, ...children) => {
-    const element = Object.assign(document.createElement(tag), properties);
-    element.append(...children);
-    return element;
-  };
   const lists = { events: make("div", { className: "c-list-view c-events" }),
     reflectors: make("div", { className: "c-list-view c-reflectors" }),
     variants: make("div", { className: "c-list-view c-variants" }) };
@@ -54,14 +50,8 @@
 
   function table(list, head, rows) {
     const top = list.scrollTop;
-    list.replaceChildren(make("table", {}, make("thead", {}, make("tr", {}, ...head)), make("tbody", {}, ...rows)));
+    list.replaceChildren(whole(head, rows));
     list.scrollTop = top;
-  }
-
-  // Rows can be reached by the keyboard, too.
-  function row(cells, title, act) {
-    const onkeydown = (event) => { if (event.key === "Enter") act(); };
-    return make("tr", { title, tabIndex: 0, onclick: act, onkeydown }, ...cells);
   }
 
   function drawEvents() {
@@ -102,13 +92,11 @@
   }
 
   function header(index, title, hint, key) {
-    const mark = sorted.column === index ? (sorted.isDown ? " ▾" : " ▴") : "";
-    const name = make("button", { textContent: title + mark, title: `${hint} Click: sort.` });
-    name.onclick = () => {
+    const order = sorted.column === index ? (sorted.isDown ? "down" : "up") : "";
+    const cell = headOf(title, hint, order, () => {
       sorted = { column: index, isDown: sorted.column === index ? !sorted.isDown : index > 0 };
       draw();
-    };
-    const cell = make("th", {}, name);
+    });
     if (!key) return cell;
     const isOn = found.colored === key;
     const color = make("button", { className: "c-color", textContent: isOn ? "◉" : "○",
@@ -150,7 +138,6 @@
         make("td", { textContent: label }), ...texts.map((text) => make("td", { textContent: text })))),
       ...compared.figures.map(([label, cells]) => make("tr", {}, make("td", { textContent: label }),
         ...cells.map(([text, verdict, expected]) => cell(text, verdict, expected))))];
-    const whole = (head, body) => make("table", {}, make("thead", {}, make("tr", {}, ...head)), make("tbody", {}, ...body));
     const half = Math.ceil(rows.length / 2), heads = (has) => [make("th"), ...names.map((name, index) => variantHeader(name, index, has))];
     const places = moments.map(([time, text]) => row([make("td", { textContent: `${time.toFixed(1)} s` }),
       make("td", { textContent: text })], "Go to this moment", () => seek(time)));

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import Positional, UseAppendAction, arg
 
 from commission.errors import UsageError
-from commission.site.quantity import PERCENT, PLAIN_DEGREES
+from commission.site.quantity import PERCENT, PLAIN_DEGREES, counted_text
 
 if TYPE_CHECKING:
     from commission.site.reflectors import ReflectorMap
@@ -86,9 +86,9 @@ def _cold_start(found: AmbiguityResult, reflectors: ReflectorMap) -> list[str]:
             ", ".join(reflectors.reflectors[index].id for index in group) for group in (pair.constellation, pair.image)
         )
         here, there = (_pose(pose) for pose in (pair.example, pair.partner))
-        lines.append(f"Alike        {names} as {images}: {pair.poses} poses, e.g. {here} for {there}")
+        lines.append(f"Alike        {names} as {images}: {counted_text(pair.poses, 'pose')}, e.g. {here} for {there}")
     more = len(found.cold.pairs) - NAMED
-    return [*lines, f"             and {more} more pairs"] if more > 0 else lines
+    return [*lines, f"             and {counted_text(more, 'more pair')}"] if more > 0 else lines
 
 
 def _pose(pose: tuple[float, float, float]) -> str:

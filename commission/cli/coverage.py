@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from tyro.conf import Positional, arg
 
 from commission.errors import UsageError
-from commission.site.quantity import MILLIMETRES, PERCENT, PLAIN_DEGREES, Shown
+from commission.site.quantity import MILLIMETRES, PERCENT, PLAIN_DEGREES, Shown, counted_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -137,7 +137,8 @@ def _report(entries: dict[str, int | float | None], options: FixOptions) -> list
         return "none" if value is None else unit.text(value, form)
 
     return [
-        f"Floor        {entries['area_m2']:.0f} m2 in {entries['points']} points; {entries['reflectors']} reflectors",
+        f"Floor        {entries['area_m2']:.0f} m2 in {entries['points']} points; "
+        f"{counted_text(entries['reflectors'], 'reflector')}",
         f"Heading      {_heading(options)}",
         f"Visible      1 or more on {share('share_1_visible')}, 2 on {share('share_2_visible')}, "
         f"3 on {share('share_3_visible')}",

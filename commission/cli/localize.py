@@ -14,7 +14,7 @@ from tyro.conf import Positional, UseAppendAction, arg
 
 from commission.cli.parsing import initial_pose, reference_antenna
 from commission.errors import UsageError
-from commission.site.quantity import MILLIMETRES, PERCENT, PLAIN_DEGREES
+from commission.site.quantity import MILLIMETRES, PERCENT, PLAIN_DEGREES, counted_text
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Sequence
@@ -268,7 +268,11 @@ def _protected(told: dict[str, Any]) -> str:
         "none" if value is None else MILLIMETRES.text(value, ".1f")
         for value in (told["protection_position_median_m"], told["protection_position_p95_m"])
     )
-    beyond = f"; error beyond it in {told['beyond_protection']} cycles" if "beyond_protection" in told else ""
+    beyond = (
+        f"; error beyond it in {counted_text(told['beyond_protection'], 'cycle')}"
+        if "beyond_protection" in told
+        else ""
+    )
     return (
         f"Protection   position {median} median, {p95} at 95 %, at a risk of {told['integrity_risk']:g} per cycle; "
         f"within the limits {PERCENT.text(told['protected_fraction'] or 0.0, '.1f')}{beyond}"

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from tyro.conf import Positional, UseAppendAction, arg
 
 from commission.errors import UsageError
+from commission.site.quantity import counted_text
 
 if TYPE_CHECKING:
     from commission.planning.placement import Placement, PlacementOptions
@@ -219,7 +220,9 @@ def _report(found: Placement) -> list[str]:
     # Where no layout from these places meets the demands, there is no number that is enough.
     bound = f"; fewer than {found.at_least} new ones cannot be enough" if found.at_least else ""
     kept = len(found.reflectors) - found.added
-    lines = [f"Reflectors   {found.added} suggested among {len(found.candidates)} places, {kept} kept{bound}"]
+    lines = [
+        f"Reflectors   {found.added} suggested among {counted_text(len(found.candidates), 'place')}, {kept} kept{bound}"
+    ]
     if found.was_ended:
         lines.append("Ended        before its time, with the best layout so far: fewer reflectors might do")
     return lines + [f"Not met      {_told(unmet)}" for unmet in found.unmet]

@@ -27,6 +27,7 @@ from commission.io.findings import Findings, shown
 from commission.io.outline import outline_map
 from commission.progress import Progress, silent
 from commission.site.floor_map import FloorMap
+from commission.site.quantity import counted_text
 
 TOLERANCE = 0.001
 """Distance [m] between a curve and its chords: a fiftieth of a map's usual cell."""
@@ -227,7 +228,8 @@ class _Reader:
             if doubt:
                 self._found.add("", doubt)
         for kind, count in self._left_out.most_common():
-            self._found.add("", f"{count} entities of kind {shown(kind)} are no walls or not understood, and left out")
+            what = counted_text(count, "entity", "entities")
+            self._found.add("", f"left out as no walls, or not understood: {what} of kind {shown(kind)}")
         counts = np.bincount(layer_of, minlength=len(self._names)).tolist()
         layers = tuple(DrawingLayer(name, self._is_visible(name), counts[i]) for name, i in self._names.items())
         return Drawing(

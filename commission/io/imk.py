@@ -15,6 +15,7 @@ from commission.errors import FileFormatError
 from commission.io.atomic import write_text
 from commission.io.findings import Findings, shown
 from commission.io.reading import read_text
+from commission.site.quantity import counted_text
 from commission.site.reflectors import Reflector, ReflectorKind, ReflectorMap
 
 SIZE_LIMIT = 16_000_000
@@ -75,7 +76,9 @@ def read_imk(path: Path) -> ReflectorImport:
         lines[reflector.id] = number
         reflectors.append(reflector)
     if len(reflectors) < FEWEST:
-        found.add("", f"the layout has {len(reflectors)} reflectors; a NAV sensor needs {FEWEST} or more")
+        found.add(
+            "", f"the layout has {counted_text(len(reflectors), 'reflector')}; a NAV sensor needs {FEWEST} or more"
+        )
     return ReflectorImport(ReflectorMap(tuple(reflectors)), found.lines())
 
 
@@ -208,6 +211,8 @@ def _note_losses(reflectors: ReflectorMap, found: Findings) -> None:
     for name in ("heading", "height", "sigma", "note", "locked"):
         count = sum(getattr(r, name) != getattr(usual, name) for r in reflectors.reflectors)
         if count:
-            found.add("", f"{name} of {count} reflectors is not carried by the format")
+            found.add("", f"{name} of {counted_text(count, 'reflector')} is not carried by the format")
     if len(reflectors) < FEWEST:
-        found.add("", f"the layout has {len(reflectors)} reflectors; a NAV sensor needs {FEWEST} or more")
+        found.add(
+            "", f"the layout has {counted_text(len(reflectors), 'reflector')}; a NAV sensor needs {FEWEST} or more"
+        )

@@ -35,6 +35,7 @@ from commission.io.vda5050 import read_order
 from commission.site import network_diff
 from commission.site.floor_map import FloorMap
 from commission.site.project import Project
+from commission.site.quantity import counted_text
 from commission.site.reflector_diff import difference, merged
 from commission.site.reflectors import ReflectorMap
 
@@ -268,8 +269,8 @@ def _written_routes(source: Path, imported: RouteImport, target: Path, wanted: K
         stations=network_diff.merged(project.stations, stations, remove=False),
     )
     save_project(changed, _folder(target))
-    read = f"{len(imported.routes)} routes and {len(imported.stations)} stations read"
-    return (*imported.warnings, f"{read}, {len(routes.removed)} other routes kept")
+    read = f"{counted_text(len(imported.routes), 'route')} and {counted_text(len(imported.stations), 'station')} read"
+    return (*imported.warnings, f"{read}, {counted_text(len(routes.removed), 'other route')} kept")
 
 
 def _routes(source: Path, options: ConvertOptions) -> RouteImport:

@@ -20,6 +20,7 @@ from commission.io.atomic import write_text
 from commission.io.findings import Findings
 from commission.site.fields import in_file
 from commission.site.project import Project
+from commission.site.quantity import counted_text
 from commission.site.routes import Direction, Route, Segment
 from commission.site.stations import Station
 
@@ -169,11 +170,12 @@ def _station(station: Station, node: str) -> dict[str, Any]:
 def _note_losses(project: Project, found: Findings) -> None:
     """Say what LIF has no place for."""
     if len(project.reflectors):
-        found.add("", f"{len(project.reflectors)} reflectors are not carried: LIF knows no localization")
+        what = counted_text(len(project.reflectors), "reflector is", "reflectors are")
+        found.add("", f"{what} not carried: LIF knows no localization")
     if project.floor_map is not None:
         found.add("", "the floor map is not carried")
     found.add("", "vehicle, scanner, parameters, disturbances and demands on the layout are not carried")
     if project.stations:
-        found.add("", f"the required accuracy of {len(project.stations)} stations is not carried")
+        found.add("", f"the required accuracy of {counted_text(len(project.stations), 'station')} is not carried")
     if any(segment.speed is not None for route in project.routes for segment in route.segments):
         found.add("", "each edge carries its speed; which of them were a route's own is lost")

@@ -26,7 +26,7 @@ from commission.planning.vehicle_visibility import VehicleVisibility
 from commission.planning.visibility import VisibilityOptions, build_visibility
 from commission.progress import Progress, silent
 from commission.site.parts import Equipped
-from commission.site.quantity import MILLIMETRES, PLAIN_DEGREES, Shown
+from commission.site.quantity import MILLIMETRES, PLAIN_DEGREES, Shown, counted_text
 from commission.site.reflectors import ReflectorMap
 from commission.site.walls import walls_of
 
@@ -198,6 +198,6 @@ def compared(before: LayoutFigures, after: LayoutFigures) -> tuple[tuple[str, st
         lost = both(MILLIMETRES, one.failing, other.failing, ".1f")
         allowed = MILLIMETRES.text(one.required, ".0f")
         lines.append((one.name, f"2-sigma {place} of {allowed}; any one failing {lost}"))
-    lines.append(("Stop if failing", f"{before.stopping} -> {after.stopping} reflectors"))
+    lines.append(("Stop if failing", f"{before.stopping} -> {counted_text(after.stopping, 'reflector')}"))
     lines.append(("Ambiguous", f"{before.ambiguous} -> {after.ambiguous} of {after.places} starts and stations"))
     return tuple(lines)

@@ -330,6 +330,18 @@ def number_text(value: float, digits: int = 3) -> str:
     return f"{value:.0f}" if 10.0**digits <= abs(float(short)) < UNREADABLE else short
 
 
+def counted_text(count: int, one: str, several: str = "") -> str:
+    """Return how many there are of something: `1 route`, `2 routes`.
+
+    Parameters
+    ----------
+    count : how many.
+    one : what one of them is called.
+    several : what several are called; empty: with an s at its end.
+    """
+    return f"{count} {one if count == 1 else several or one + 's'}"
+
+
 def _formatted(number: float, form: str) -> str:
     """A number in a form of Python's; `.4g` means four digits, without an exponent where it is large."""
     return number_text(number, int(form[1:-1])) if form.endswith("g") and form.startswith(".") else f"{number:{form}}"

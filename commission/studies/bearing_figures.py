@@ -7,7 +7,7 @@ import numpy as np
 from commission.localization.bearings import LASTING, NIS, OFF, REFLECTOR, USE, BearingUse
 from commission.localization.estimate import Mode
 from commission.localization.run_columns import RunColumns
-from commission.site.quantity import DEGREES, PERCENT
+from commission.site.quantity import DEGREES, PERCENT, counted_text
 from commission.studies.plausibility import Finding
 
 Number = int | float | None
@@ -90,7 +90,7 @@ def bearing_findings(columns: RunColumns) -> tuple[Finding, ...]:
         return ()
     count = int(np.count_nonzero(np.isfinite(met.bearings)))
     if setup.bearing_model is None:
-        found = f"the recording holds {count} bearings of a goniometer, and the vehicle has none"
+        found = f"the recording holds {counted_text(count, 'bearing')} of a goniometer, and the vehicle has none"
         remedy = "give one of its scanners `kind: goniometer` in project.yaml"
         return (Finding(found=found, probably="the scanner is entered as a laser", remedy=remedy),)
     names = sorted({name for name in met.reflectors if name})

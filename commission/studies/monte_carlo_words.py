@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from commission.geometry.arrays import FloatArray
-from commission.site.quantity import MILLIMETRES, PERCENT
+from commission.site.quantity import MILLIMETRES, PERCENT, counted_text
 from commission.studies.monte_carlo_figures import QUANTILES, MonteCarloResult
 
 
@@ -26,9 +26,10 @@ def told(result: MonteCarloResult) -> list[str]:
         f"seed {inputs.seed}",
         f"Available    {PERCENT.of(result.availability):.3f} {PERCENT.unit} of the cycles; worst drive "
         f"{PERCENT.of(availability.min()):.2f} {PERCENT.unit}, "
-        f"{np.count_nonzero(availability == 1.0)} drives without any stop",
+        f"{counted_text(np.count_nonzero(availability == 1.0), 'drive')} without any stop",
         f"Stops        {int(result.column('fail_episodes').sum())}, the longest of "
-        f"{result.column('longest_fail').max():.1f} s; lost {np.count_nonzero(result.column('lost_fraction'))} drives",
+        f"{result.column('longest_fail').max():.1f} s; lost "
+        f"{counted_text(np.count_nonzero(result.column('lost_fraction')), 'drive')}",
         f"Error        {_listed(result.error_quantiles)}",
         f"Operational  {_listed(result.operational_error_quantiles)}",
         f"ANEES        {result.anees:.2f}, of the position {result.anees_position:.2f} (1 is consistent)",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from commission.geometry.arrays import FloatArray, IntArray
-from commission.site.quantity import PERCENT, PLAIN_DEGREES, number_text
+from commission.site.quantity import PERCENT, PLAIN_DEGREES, counted_text, number_text
 from commission.site.record_log import RecordLog
 from commission.site.record_store import ScanStore
 
@@ -49,7 +49,7 @@ def channels(log: RecordLog) -> tuple[Channel, ...]:
         stamps = log.detection_stamps_ns[log.detection_scanners == index]
         if len(stamps):
             seen = log.range_bearing[of_row == index]
-            values = f"{len(seen)} reflectors"
+            values = counted_text(len(seen), "reflector")
             if len(seen):
                 values += f", {_spans(seen, ('range', 'bearing'), ('m', 'rad'))}"
             found.append(_channel(log, _called(log, "detections", name), stamps, values))
@@ -58,13 +58,13 @@ def channels(log: RecordLog) -> tuple[Channel, ...]:
             called = _called(log, "scans", log.scanners[scans.scanner])
             found.append(_channel(log, called, scans.stamps_ns, _scan_values(scans)))
     if len(log.tags):
-        values = f"{len(log.tags.ids)} tags seen"
+        values = f"{counted_text(len(log.tags.ids), 'tag')} seen"
         if len(log.tags.ids):
             values += f", {_spans(log.tags.sightings[:, :3], ('x', 'y', 'theta'), ('m', 'm', 'rad'))}"
         found.append(_channel(log, "tags", log.tags.stamps_ns, values))
     if len(log.bearings):
         met = log.bearings.bearings[np.isfinite(log.bearings.bearings)]
-        values = f"{len(met)} reflexes"
+        values = counted_text(len(met), "reflex", "reflexes")
         if len(met):
             values += f", {_spans(met[:, np.newaxis], ('bearing',), ('rad',))}"
         found.append(_channel(log, "bearings", log.bearings.stamps_ns, values))
@@ -128,7 +128,7 @@ def _scan_values(scans: ScanStore) -> str:
 def beams_in_words(beams: IntArray) -> str:
     """How many beams scans have: `541 beams`, `540 to 542 beams`."""
     fewest, most = int(beams.min()), int(beams.max())
-    return f"{most} beams" if fewest == most else f"{fewest} to {most} beams"
+    return counted_text(most, "beam") if fewest == most else f"{fewest} to {most} beams"
 
 
 def _spans(values: FloatArray, names: tuple[str, ...], units: tuple[str, ...]) -> str:

@@ -17,6 +17,7 @@ from commission.geometry.arrays import FloatArray, read_only
 from commission.progress import Progress, silent
 from commission.site.fields import FieldInfo, field_info, get_field, with_field
 from commission.site.parameters import Parameters
+from commission.site.quantity import counted_text
 from commission.studies.inputs import StudyInput
 from commission.studies.run import RunInput, RunResult, judged_run
 from commission.studies.variant_figures import BY_KEY, VariantFigure
@@ -203,7 +204,7 @@ def told(result: SweepResult) -> list[str]:
     """
     figure, axes = result.figure, result.inputs.axes
     lines = [
-        f"Sweep        {result.values.size} runs over {' and '.join(axis.key for axis in axes)}",
+        f"Sweep        {counted_text(result.values.size, 'run')} over {' and '.join(axis.key for axis in axes)}",
         f"Project      {figure.label} {figure.text(result.at_operating)} at {_named(axes, result.operating)}",
     ]
     if not np.isfinite(result.values).any():

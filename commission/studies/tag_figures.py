@@ -6,6 +6,7 @@ import numpy as np
 
 from commission.localization.run_columns import RunColumns
 from commission.localization.tags import NIS, USE, TagUse
+from commission.site.quantity import counted_text
 from commission.studies.plausibility import Finding
 
 Number = int | float | None
@@ -59,7 +60,7 @@ def tag_findings(columns: RunColumns) -> tuple[Finding, ...]:
     if seen is None or not len(seen.ids) or not setup.parameters.tag.enabled:
         return ()
     if not setup.tags:
-        found = f"the recording holds {len(seen.ids)} sightings of tags, and the site has none"
+        found = f"the recording holds {counted_text(len(seen.ids), 'sighting')} of tags, and the site has none"
         return (
             Finding(found=found, probably="they were not surveyed", remedy="enter them under tags: in project.yaml"),
         )

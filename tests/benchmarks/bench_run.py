@@ -14,8 +14,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from commission.app.base.carrier import as_text
 from commission.app.run.charts import CHARTS
-from commission.app.run.drawn_curves import as_text, drawn, values_at
+from commission.app.run.drawn_curves import drawn, values_at
 from commission.app.run.playback import Playback
 from commission.localization.run_columns import RunSegment
 from commission.localization.setup import LocalizerSetup

@@ -111,7 +111,7 @@ def test_no_button_or_name_is_cut_off_at_any_size(served: Served, window: Callab
     page.open_tab("Site")
     page.fold("Vehicle")
     page.page.wait_for_function(
-        "() => [...document.querySelectorAll('div:has(>.c-rows)~div button')].filter((each) => {"
+        "() => [...document.querySelectorAll('.c-data tbody tr')].filter((each) => {"
         " const box = each.getBoundingClientRect();"
         " return each.contains(document.elementFromPoint(box.left + 20, box.bottom - 2)); }).length >= 4"
     )
@@ -142,13 +142,11 @@ def test_what_is_selected_on_the_floor_is_scrolled_to_in_its_table_on_whichever_
     for name in ("W50", "W20"):
         reflector = next(each for each in served.state.project.reflectors.reflectors if each.id == name)
         page.click_at((reflector.x, reflector.y))
-        row = page.page.get_by_role("button", name=name)
-        row.wait_for(state="visible")
         page.page.wait_for_function(
-            "name => { const row = [...document.querySelectorAll('button')].find(e => e.textContent.startsWith(name));"
+            "name => { const row = document.querySelector(`.c-data tr[data-key='${name}'][aria-selected=true]`);"
             " if (!row) return false; const box = row.getBoundingClientRect();"
             " const at = document.elementFromPoint(box.left + 20, box.top + box.height / 2);"
             " return row.contains(at); }",
-            arg=f"{name} ",
+            arg=name,
         )
     assert page.errors == []

@@ -188,7 +188,7 @@ def test_layers_can_be_chosen_and_those_switched_off_are_not_drawn(tmp_path: Pat
     ]
     assert len(read.on()) == 1
     np.testing.assert_allclose(read.on(["GRID"]), [[[0, 1], [10, 1]]])
-    assert read.warnings == ("1 entities of kind 'TEXT' are no walls or not understood, and left out",)
+    assert read.warnings == ("left out as no walls, or not understood: 1 entity of kind 'TEXT'",)
     with pytest.raises(UsageError, match="no layer is called 'ROOF'; the drawing has: 'WALL', 'GRID', 'OLD'"):
         read.on(["ROOF"])
 

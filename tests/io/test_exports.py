@@ -48,7 +48,7 @@ def test_each_format_says_what_it_cannot_carry() -> None:
     project = Project(name="Hall", reflectors=ReflectorMap((Reflector(id="north", x=0.0004, y=2.0, note="pillar"),)))
     assert export(project, Format.TABLE).losses == ()
     losses = export(project, Format.IMK).losses
-    assert "note of 1 reflectors is not carried by the format" in losses
+    assert "note of 1 reflector is not carried by the format" in losses
     assert any("ids become numbers" in loss for loss in losses)
     layout = export(room(), Format.LIF)
     assert layout.name == "Room.lif"

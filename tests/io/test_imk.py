@@ -83,7 +83,7 @@ def test_what_the_format_cannot_carry_is_said(tmp_path: Path) -> None:
         "reflector 'north': ids become numbers",
         "positions are rounded to whole millimetres",
         "layer 'hall' becomes layer 1",
-        "heading of 1 reflectors is not carried",
+        "heading of 1 reflector is not carried",
         "height of 1",
         "sigma of 1",
         "note of 1",

@@ -71,7 +71,7 @@ def test_order_is_added_to_the_routes_of_a_project(tmp_path: Path) -> None:
     save_project(Project(name="Hall", routes=(ROUTE,)), tmp_path / "hall")
     (tmp_path / "order.json").write_text(json.dumps(ORDER))
     assert kind_of_source(tmp_path / "order.json") is Kind.ORDER
-    assert "1 routes and 0 stations read, 1 other routes kept" in convert_file(
+    assert "1 route and 0 stations read, 1 other route kept" in convert_file(
         tmp_path / "order.json", tmp_path / "hall", USUAL, force=True
     )
     assert [route.name for route in load_project(tmp_path / "hall").routes] == ["Loop", "order-7"]

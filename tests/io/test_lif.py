@@ -159,7 +159,7 @@ def test_what_lif_cannot_carry_is_said(tmp_path: Path) -> None:
     )
     losses = "\n".join(write_lif(project, tmp_path / "out.lif"))
     for said in (
-        "1 reflectors are not carried: LIF knows no localization",
+        "1 reflector is not carried: LIF knows no localization",
         "the floor map is not carried",
         "vehicle, scanner, parameters, disturbances and demands on the layout are not carried",
         "route 'Loop': knots are scaled to 0 to 1",

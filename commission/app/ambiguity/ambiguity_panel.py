@@ -13,6 +13,7 @@ from commission.app.base.panel import BasePanel, Post, posting
 from commission.app.base.rows import Rows
 from commission.app.base.view import PageView
 from commission.site.fields import get_field
+from commission.site.quantity import counted_text
 
 MOST_PAIRS = 15
 MOST_NAMES = 6
@@ -57,7 +58,7 @@ def _summary(found: ColdStartView) -> str:
     count = len(found.ambiguity.pairs)
     if count:
         listed = f", the {MOST_PAIRS} most frequent listed" if count > MOST_PAIRS else ""
-        notes = [f"{count} pairs of look-alikes{listed}; a click shows one."]
+        notes = [f"{counted_text(count, 'pair')} of look-alikes{listed}; a click shows one."]
     else:
         notes = ["No two places look alike."]
     if found.outdated:
@@ -73,7 +74,7 @@ def _lines(found: ColdStartView, chosen: int) -> list[tuple[str, theme.Color]]:
     return [
         (
             f"{_names(ambiguity.names(pair.constellation))} like {_names(ambiguity.names(pair.image))}: "
-            f"{pair.poses} poses",
+            f"{counted_text(pair.poses, 'pose')}",
             theme.SELECTED_LINE if index == chosen else theme.LINE,
         )
         for index, pair in enumerate(ambiguity.pairs[:MOST_PAIRS])

@@ -133,6 +133,28 @@ div:has(>div>.c-top)>div:has(.c-now){{position:absolute}}
 [data-dock-region] .mantine-Slider-root~.mantine-NumberInput-root{{width:68px!important;margin-left:6px!important}}
 .c-reflectors :is(td,th):first-child{{position:sticky;left:-8px;z-index:1;background:{css(Surface.HEAD.dark)}}}
 .c-reflectors th:first-child{{z-index:2}}
+.c-data{{overflow:auto;font-size:12px;margin:0 2px 0 4px;scrollbar-width:thin}}
+.c-data h4{{margin:6px 0 1px;font-size:11px;font-weight:600;opacity:.65;position:sticky;left:0}}
+.c-data :is(th,td){{text-align:left;padding:1px 6px}}
+.c-data .c-right{{text-align:right}}
+.c-data th{{z-index:1}}
+.c-data :is(td,th):first-child{{position:sticky;left:0;z-index:1;background:{css(Surface.HEAD.dark)}}}
+.c-data th:first-child{{z-index:2}}
+.c-data td{{height:20px;box-sizing:border-box;max-width:180px;overflow:hidden;text-overflow:ellipsis}}
+.c-data td input[type=checkbox]{{margin:0;vertical-align:middle;accent-color:{css(Worded.BRAND.dark)}}}
+.c-data tr[data-tint=warning] td{{background:{css(Surface.WARNING_LINE.dark)}}}
+.c-data tr[data-tint=error] td{{background:{css(Surface.ERROR_LINE.dark)}}}
+.c-data tbody tr[aria-selected=true] td{{background:var(--c-selected-line)}}
+.c-data [data-edits]:hover{{text-decoration:underline dotted}}
+.c-data [data-due]{{opacity:.6}}
+.c-data .c-cell{{width:100%;min-width:3.2em;box-sizing:border-box;margin:-1px 0;padding:0 2px;font:inherit;
+ color:inherit;background:{css(Surface.CARD.dark)};border:1px solid {css(Worded.BRAND.dark)};border-radius:2px;
+ text-align:inherit}}
+.c-data td[data-refused]{{box-shadow:inset 0 0 0 1px {css(Worded.REFUSED.dark)}}}
+.c-data td[data-refused]::after{{display:none}}
+.c-data .c-refusal td{{padding:0;max-width:none;overflow:visible;cursor:default}}
+.c-refusal div{{position:sticky;left:0;width:{RIGHT_PX - 34}px;padding:1px 6px 3px;white-space:normal;
+ color:{css(Worded.REFUSED.dark)};font-size:11.5px;line-height:1.3}}
 div:has(>div>.c-bottom)>:nth-child(5) .mantine-NumberInput-root{{width:60.4px!important}}
 div:has(>div>.c-bottom)>:nth-child(5) .mantine-NumberInput-input{{padding-right:15px!important}}
 div:has(>div>.c-bottom)>:nth-child(5) .mantine-NumberInput-wrapper::after{{content:"s" / "";position:absolute;

@@ -263,18 +263,20 @@ div:has(>.c-carried){{display:none!important}}
 .c-plots[data-view=events] .c-events,.c-plots[data-view=reflectors] .c-reflectors,
 .c-plots[data-view=variants] .c-variants{{display:block}}
 .c-plots:not([data-view=plots]) :is(canvas,.c-whole,.c-png){{display:none!important}}
-.c-list-view table{{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums}}
+:is(.c-list-view,.c-data) table{{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums}}
 .c-events table{{width:auto;min-width:480px}}
-.c-list-view th{{position:sticky;top:0;background:{css(Surface.HEAD.dark)};text-align:right;font-weight:400;
- white-space:nowrap;
+:is(.c-list-view,.c-data) th{{position:sticky;top:0;background:{css(Surface.HEAD.dark)};text-align:right;
+ font-weight:400;white-space:nowrap;
  padding:1px 8px}}
-.c-list-view th button{{background:none;border:none;color:inherit;font:inherit;cursor:pointer;padding:0;opacity:.75}}
-.c-list-view th button:is(:hover,:focus-visible){{opacity:1;text-decoration:underline}}
+:is(.c-list-view,.c-data) th button{{background:none;border:none;color:inherit;
+ font:inherit;cursor:pointer;padding:0;opacity:.75}}
+:is(.c-list-view,.c-data) th button:is(:hover,:focus-visible){{opacity:1;text-decoration:underline}}
 .c-list-view th .c-color{{padding-left:5px;color:{css(SELECTED)}}}
-.c-list-view td{{padding:1px 8px;text-align:right;white-space:nowrap;border-top:1px solid {css(Surface.RULE.dark)}}}
-.c-list-view :is(td,th):first-child,.c-events :is(td,th){{text-align:left}}
-.c-list-view tbody tr{{cursor:pointer}}
-.c-list-view tbody tr:is(:hover,:focus-visible){{background:{css(Surface.PRESSED.dark)};outline:none}}
+:is(.c-list-view,.c-data) td{{padding:1px 8px;text-align:right;white-space:nowrap;
+ border-top:1px solid {css(Surface.RULE.dark)}}}
+:is(.c-list-view,.c-data) :is(td,th):first-child,.c-events :is(td,th){{text-align:left}}
+:is(.c-list-view,.c-data) tbody tr{{cursor:pointer}}
+:is(.c-list-view,.c-data) tbody tr:is(:hover,:focus-visible){{background:{css(Surface.PRESSED.dark)};outline:none}}
 .c-variants>div{{display:flex;flex-wrap:wrap;gap:2px 22px;align-items:flex-start}}
 .c-variants table{{width:auto;flex:none}}
 .c-variants tbody tr{{cursor:default}}

@@ -16,7 +16,7 @@ from commission.app.coverage.settings import BY_CONTOURS, CoverageSettings, Figu
 from commission.app.coverage.view import EllipseView, FloorReading, HeatView, coverage_of
 from commission.app.coverage.words import FIGURE_NAMES, HEADING_NAMES, MEASUREMENT_NAMES, none_text, value_text
 from commission.planning.error_budget import CONTRIBUTIONS
-from commission.site.quantity import DEGREES, MILLIMETRES, PERCENT, Shown, number_text
+from commission.site.quantity import DEGREES, MILLIMETRES, PERCENT, Shown, counted_text, number_text
 
 AMONG_PEOPLE = (Figure.EXPECTED_VISIBLE, Figure.TWO_OR_MORE, Figure.THREE_OR_MORE)
 HATCH_CSS = "repeating-linear-gradient(135deg,{0} 0 3px,{1} 3px 6px)"
@@ -67,7 +67,9 @@ def ellipse_note(found: EllipseView) -> str:
     """Say how much larger than they are the ellipses on the heatmap are drawn."""
     if not len(found.centers) and not found.without_fix and not found.too_large:
         return ""
-    left_out = [f"{found.without_fix} places without a fix"] if found.without_fix else []
+    left_out = (
+        [counted_text(found.without_fix, "place without a fix", "places without a fix")] if found.without_fix else []
+    )
     left_out += [f"{found.too_large} too large for the grid"] if found.too_large else []
     note = f"; left out: {', '.join(left_out)}" if left_out else ""
     return f"<div class='c-note'>ellipses: 1σ of a fix, drawn {found.factor:g}x{note}</div>"

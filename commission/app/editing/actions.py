@@ -67,6 +67,8 @@ class SelectReflectors(Action):
     """Their ids; unknown ones are ignored."""
     fly: bool = False
     """Whether to bring them into view."""
+    toggle: bool = False
+    """Whether they are selected besides the others, or, where they are selected already, no longer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +85,18 @@ class DuplicateSelected(Action):
 class SetSelected(Action):
     """Set one field of every selected reflector."""
 
+    name: str
+    """Field of `Reflector`."""
+    value: object
+    """New value, SI and radians."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetReflector(Action):
+    """Set one field of a reflector, be it selected or not."""
+
+    id: str
+    """Which one."""
     name: str
     """Field of `Reflector`."""
     value: object
@@ -181,11 +195,15 @@ class SetSegment(Action):
 
 
 @dataclass(frozen=True, slots=True)
-class RenameRoute(Action):
-    """Give the selected route another name."""
+class SetRoute(Action):
+    """Set one field of a route."""
 
-    name: str
-    """New name."""
+    field: str
+    """Field of `Route`: `name` or `speed`."""
+    value: object
+    """New value, SI."""
+    of: str = ""
+    """Name of the route; empty: the selected one."""
 
 
 @dataclass(frozen=True, slots=True)

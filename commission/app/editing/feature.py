@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from commission.app.base.feature import REFLECTORS, ROUTES, SELECTION, SITE, Docked, Feature
-from commission.app.editing import posed_reducer, reducer, site_reducer, zone_reducer
+from commission.app.editing import posed_reducer, reducer, site_reducer, table_reducer, zone_reducer
 from commission.app.editing.camera_fields import CameraFields
 from commission.app.editing.equipment_fields import EquipmentFields
 from commission.app.editing.overlay import Overlay
@@ -21,7 +21,7 @@ from commission.app.editing.zone_layer import ZoneLayer
 
 FEATURE = Feature(
     name="editing",
-    reducers=(reducer, site_reducer, posed_reducer, zone_reducer),
+    reducers=(reducer, site_reducer, posed_reducer, zone_reducer, table_reducer),
     layers=(ZoneLayer, TagLayer, RouteLayer, StationLayer, ReflectorLayer, ReflectorNameLayer),
     panels=(
         Docked(make=lambda at: EquipmentFields(at.gui, at.post, at.state.project), tab=SITE, rank=30),
@@ -39,7 +39,7 @@ FEATURE = Feature(
             own=True,
         ),
         Docked(make=lambda at: ToolHint(at.gui, at.browser), tab=SELECTION, rank=90, own=True),
-        Docked(make=lambda at: ReflectorTable(at.gui, at.post, at.browser, at.container), tab=REFLECTORS, own=True),
-        Docked(make=lambda at: RouteTable(at.gui, at.post, at.browser, at.container), tab=ROUTES, own=True),
+        Docked(make=lambda at: ReflectorTable(at.gui, at.post, at.browser), tab=REFLECTORS, own=True),
+        Docked(make=lambda at: RouteTable(at.gui, at.post, at.browser), tab=ROUTES, own=True),
     ),
 )

@@ -44,7 +44,7 @@ class MovePosed(Action):
 
 @dataclass(frozen=True, slots=True)
 class SetPosed(Action):
-    """Set one field of the selected one."""
+    """Set one field of a station or a tag."""
 
     kind: PosedKind
     """Station or tag: an entry that is finished by selecting something else sets nothing of that."""
@@ -52,6 +52,8 @@ class SetPosed(Action):
     """Field of `Station` or `Tag`."""
     value: object
     """New value, SI and radians."""
+    of: str = ""
+    """What it is called; empty: the one that is selected."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,12 +16,12 @@ from commission.errors import UsageError
 from commission.site.fields import with_field
 
 
-def _selected(state: AppState, kind: PosedKind, sender: Sender) -> PosedMark:
-    """Return the mark of a kind that a browser has selected; raises UsageError for none."""
-    key = editor_of(state, sender.browser).posed
+def _selected(state: AppState, kind: PosedKind, sender: Sender, called: str = "") -> PosedMark:
+    """Return the mark of a kind that is called so, else the one that a browser has selected; UsageError for none."""
+    key = PosedKey(kind, called) if called else editor_of(state, sender.browser).posed
     mark = mark_of(state.project, key)
     if key is None or key.kind is not kind or mark is None:
-        raise UsageError(f"no {kind} is selected; expected one")
+        raise UsageError(f"no {kind} is called {called!r}" if called else f"no {kind} is selected; expected one")
     return mark
 
 
@@ -69,7 +69,7 @@ def move_posed(action: actions.MovePosed, state: AppState, sender: Sender) -> Ou
 
 @reduce.register
 def set_posed(action: actions.SetPosed, state: AppState, sender: Sender) -> Outcome:
-    posed, mark = KINDS[action.kind], _selected(state, action.kind, sender)
+    posed, mark = KINDS[action.kind], _selected(state, action.kind, sender, action.of)
     changed = with_field(mark, action.field, action.value, f"field of a {action.kind}")
     called, field = posed.called(mark), action.field
     is_name = field == posed.named.key

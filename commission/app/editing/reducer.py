@@ -230,7 +230,10 @@ def _enclosed(state: AppState, editor: Editor, resting: AppState, sender: Sender
 
 @reduce.register
 def select_reflectors(action: actions.SelectReflectors, state: AppState, sender: Sender) -> Outcome:
-    editor = editor_of(state, sender.browser).selecting(action.ids)
+    editor = editor_of(state, sender.browser)
+    ids = tuple(name for name in editor.selected if name not in action.ids) if action.toggle else ()
+    added = (name for name in action.ids if not action.toggle or name not in editor.selected)
+    editor = editor.selecting((*ids, *added))
     selecting = state.with_browser(sender.browser, editor)
     if not action.fly or not selected_of(state.project, editor):
         return Outcome(selecting)
@@ -281,6 +284,16 @@ def set_selected(action: actions.SetSelected, state: AppState, sender: Sender) -
         return outcome
     renamed = replace(editor, selected=(str(action.value),))
     return replace(outcome, state=outcome.state.with_browser(sender.browser, renamed))
+
+
+@reduce.register
+def set_reflector(action: actions.SetReflector, state: AppState, sender: Sender) -> Outcome:
+    editor = editor_of(state, sender.browser)
+    alone = state.with_browser(sender.browser, replace(editor, selected=(action.id,)))
+    outcome = reduce(actions.SetSelected(action.name, action.value), alone, sender)
+    name = str(action.value) if action.name == "id" else action.id
+    kept = replace(editor, selected=tuple(name if each == action.id else each for each in editor.selected))
+    return replace(outcome, state=outcome.state.with_browser(sender.browser, kept))
 
 
 @reduce.register

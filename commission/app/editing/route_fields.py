@@ -89,5 +89,5 @@ class RouteFields:
 def _setting(name: str, value: Setting) -> page_actions.Action:
     """Return the action of one field's widget."""
     if name == "name":
-        return actions.RenameRoute(str(value))
+        return actions.SetRoute("name", str(value))
     return actions.SetCoordinate(name, value) if name in PLACE else actions.SetSegment(name, value)

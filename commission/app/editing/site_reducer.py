@@ -21,7 +21,7 @@ from commission.site.editing import routes as edits
 from commission.site.editing.named import ROUTES
 from commission.site.fields import get_field, with_field
 from commission.site.layout_brief import LayoutBrief
-from commission.site.routes import Route, Segment
+from commission.site.routes import Route, Segment, route_named
 from commission.site.scanner import Scanner
 
 EQUIPMENT = {"vehicle": "vehicle", "scanners": "scanner", "tag_camera": "tag camera"}
@@ -126,14 +126,19 @@ def set_segment(action: actions.SetSegment, state: AppState, sender: Sender) -> 
 
 
 @reduce.register
-def rename_route(action: actions.RenameRoute, state: AppState, sender: Sender) -> Outcome:
-    _, route, _, point = _selected(state, sender)
-    if action.name == route.name:
+def set_route(action: actions.SetRoute, state: AppState, sender: Sender) -> Outcome:
+    editor = editor_of(state, sender.browser)
+    route = route_named(state.project.routes, action.of) if action.of else _selected(state, sender)[1]
+    if action.value == get_field(route, action.field, "field of a route"):
         return Outcome(state)
-    routes = ROUTES.put(state.project.routes, replace(route, name=action.name), route.name)
-    edit = Edit(f"rename {route.name}", sender)
-    layout = state.project.layout.renamed(route.name, action.name)
-    return with_routes(state, routes, edit, replace(point, route=action.name), layout)
+    changed = with_field(route, action.field, action.value, "field of a route")
+    is_name = action.field == "name"
+    what = f"rename {route.name}" if is_name else f"set {action.field} of {route.name}"
+    edit = Edit(what, sender, "" if is_name else f"{route.name}:{action.field}")
+    routes = ROUTES.put(state.project.routes, changed, route.name)
+    layout = state.project.layout.renamed(route.name, changed.name) if is_name else None
+    here = editor.point if editor.point is not None and editor.point.route == route.name else ControlPoint(route.name)
+    return with_routes(state, routes, edit, replace(here, route=changed.name), layout)
 
 
 @reduce.register

@@ -27,12 +27,14 @@ class ShowZone(Action):
 
 @dataclass(frozen=True, slots=True)
 class SetZone(Action):
-    """Set one field of the zone that is shown."""
+    """Set one field of a zone."""
 
     field: str
     """Field of `Zone`."""
     value: object
     """New value, SI."""
+    of: str = ""
+    """Name of the zone; empty: the one that is shown."""
 
 
 @dataclass(frozen=True, slots=True)

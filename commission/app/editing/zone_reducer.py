@@ -81,7 +81,11 @@ def show_zone(action: actions.ShowZone, state: AppState, sender: Sender) -> Outc
 
 @reduce.register
 def set_zone(action: actions.SetZone, state: AppState, sender: Sender) -> Outcome:
+    if action.of:
+        state = state.with_browser(sender.browser, ShownZone(action.of))
     zone = _shown(state, sender)
+    if action.of not in ("", zone.name):
+        raise UsageError(f"no zone is called {action.of!r}")
     changed = with_field(zone, action.field, action.value, "field of a zone")
     what = f"set {WORDS.get(action.field, action.field)} of {zone.name}"
     edit = Edit(f"rename {zone.name}" if action.field == "name" else what, sender)

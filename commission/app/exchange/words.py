@@ -10,7 +10,7 @@ from commission.app.exchange.preview import Preview
 from commission.geometry.angles import wrap_scalar
 from commission.site.fields import field_info, get_field
 from commission.site.network_diff import course_shift, length_of
-from commission.site.quantity import DEGREES, MILLIMETRES
+from commission.site.quantity import DEGREES, MILLIMETRES, counted_text
 from commission.site.reflector_diff import ReflectorChange
 from commission.site.reflectors import UNKNOWN, Reflector
 from commission.site.routes import Route
@@ -69,7 +69,7 @@ def route_changes(before: Route, after: Route) -> str:
     """Say what differs between two routes: number of curves, length, course, direction, speed."""
     said: list[str] = []
     if len(before.segments) != len(after.segments):
-        said.append(f"{len(before.segments)} → {len(after.segments)} segments")
+        said.append(f"{len(before.segments)} → {counted_text(len(after.segments), 'segment')}")
     lengths = f"{length_of(before):.2f}", f"{length_of(after):.2f}"
     if lengths[0] != lengths[1]:
         said.append(f"length {lengths[0]} → {lengths[1]} m")
@@ -80,7 +80,7 @@ def route_changes(before: Route, after: Route) -> str:
         said.append(f"course moves by {f'up to {MILLIMETRES.text(shift)}' if is_seen else 'less than 1 mm'}")
     turned = sum(old.direction is not new.direction for old, new in pairs)
     if turned:
-        said.append(f"{turned} segments change between forward and reverse")
+        said.append(f"{counted_text(turned, 'segment changes', 'segments change')} between forward and reverse")
     speeds = {(before.speed_of(old), after.speed_of(new)) for old, new in pairs}
     said += [f"speed {old:g} → {new:g} m/s" for old, new in sorted(speeds) if old != new][:3]
     return f"{after.name}: {', '.join(said) or 'written otherwise, driven the same'}"

@@ -23,7 +23,7 @@ from commission.io.dxf_units import UNITS
 from commission.io.image_map import Picture
 from commission.io.mesh import Model
 from commission.site.fields import field_hints, field_info, get_field
-from commission.site.quantity import MILLIMETRES
+from commission.site.quantity import MILLIMETRES, counted_text
 
 OPTIONS = MapOptions()
 """What the widgets begin with."""
@@ -68,7 +68,7 @@ def facts(draft: MapDraft) -> list[tuple[str, str]]:
             corners = read.segments.reshape(-1, 2)
             width, height = np.ptp(corners, axis=0) if len(corners) else (0.0, 0.0)
             rows += [("Drawn in", escaped(read.unit)), ("Measures", f"{width:.1f} x {height:.1f} m")]
-            rows += [("Lines", f"{len(read.segments):,} on {len(read.layers)} layers")]
+            rows += [("Lines", f"{len(read.segments):,} on {counted_text(len(read.layers), 'layer')}")]
         case Model():
             low, high = read.bounds
             width, depth, _ = high - low

@@ -7,7 +7,7 @@ from enum import StrEnum
 from typing import Annotated
 
 from commission.errors import UsageError
-from commission.site.quantity import Choice
+from commission.site.quantity import Choice, counted_text
 from commission.site.reflectors import ReflectorMap
 from commission.studies.layouts import FloorFigure
 
@@ -38,7 +38,7 @@ class KeptLayout:
     @property
     def title(self) -> str:
         """Its name with the number of its reflectors."""
-        return f"layout {self.number} ({len(self.reflectors)} reflectors)"
+        return f"layout {self.number} ({counted_text(len(self.reflectors), 'reflector')})"
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,7 +31,7 @@ from commission.app.placement.view import LayoutView
 from commission.app.placement.wish import LayoutWish
 from commission.site.fields import get_field
 from commission.site.layout_brief import DEMAND_PRESETS, Demands, LayoutBrief
-from commission.site.quantity import DEGREES, MILLIMETRES
+from commission.site.quantity import DEGREES, MILLIMETRES, counted_text
 from commission.studies.placement import PlacementResult, UnmetStretch
 
 POSITION, HEADING = "demands.position_limit", "demands.heading_limit"
@@ -185,7 +185,9 @@ def found_text(found: LayoutView) -> str:
     if suggestion.unmet:
         shown = min(len(suggestion.unmet), MOST_UNMET)
         more = f", the first {shown} listed" if shown < len(suggestion.unmet) else ""
-        notes.append(f"Not met on {len(suggestion.unmet)} stretches{more}; a click goes there.")
+        notes.append(
+            f"Not met on {counted_text(len(suggestion.unmet), 'stretch', 'stretches')}{more}; a click goes there."
+        )
     if suggestion.zones_told:
         notes.append(f"Zones: {suggestion.zones_told}.")
     if suggestion.farthest is not None:
@@ -220,4 +222,4 @@ def _reason(stretch: UnmetStretch) -> str:
 def _areas_text(count: int) -> str:
     if not count:
         return "No area is kept free of new reflectors."
-    return f"{count} area{'s' if count > 1 else ''} kept free; Draw area, then click in one, frees it again."
+    return f"{counted_text(count, 'area')} kept free; Draw area, then click in one, frees it again."

@@ -14,6 +14,7 @@ from commission.app.placement.wish import SMALLEST_AREA, LayoutWish, placement_i
 from commission.errors import UsageError
 from commission.site.fields import with_field
 from commission.site.layout_brief import LayoutBrief, Rectangle, low_high
+from commission.site.quantity import counted_text
 
 ACCEPT = "accept suggested layout"
 """Name of the undo step."""
@@ -115,4 +116,8 @@ def accept_layout(action: actions.AcceptLayout, state: AppState, sender: Sender)
 
 def _told(action: actions.AcceptLayout) -> str:
     added, removed = action.suggestion.placement.added, len(action.suggestion.removed)
-    return f"{added} reflectors put up" + (f", {removed} taken down" if removed else "") + "; Ctrl+Z takes it back"
+    return (
+        f"{counted_text(added, 'reflector')} put up"
+        + (f", {removed} taken down" if removed else "")
+        + "; Ctrl+Z takes it back"
+    )

@@ -18,7 +18,7 @@ from commission.app.prediction.driven import driven
 from commission.app.prediction.service import PREDICTION
 from commission.app.prediction.settings import PredictionSettings, PredictRoute
 from commission.app.prediction.view import RiskView, RouteView
-from commission.site.quantity import PERCENT
+from commission.site.quantity import PERCENT, counted_text
 
 NO_ROUTE = "Off"
 MOST_RISKS = 12
@@ -111,7 +111,7 @@ def _risk_text(route: RouteView) -> str:
         text = "No neighbors that a detection may be taken for: no wrong association expected."
     else:
         listed = f", the first {MOST_RISKS} listed" if len(route.risks) > MOST_RISKS else ""
-        text = f"{len(route.risks)} neighbors may be taken for another{listed}; a click goes there."
+        text = f"{counted_text(len(route.risks), 'neighbor')} may be taken for another{listed}; a click goes there."
     if route.by_two_sigma:
         text += (
             " Predicted is 2σ: the supervisor holds the protection level, which is larger, and may stop the vehicle "

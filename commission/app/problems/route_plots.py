@@ -22,7 +22,7 @@ from commission.app.editing.route_gestures import route_of
 from commission.app.problems.view import inspection_of
 from commission.geometry.arrays import FloatArray
 from commission.planning.route_profile import RouteProfile
-from commission.site.quantity import DEGREES
+from commission.site.quantity import DEGREES, counted_text
 from commission.studies.violations import Violation, ViolationKind
 
 NOTHING = "Select a route on the floor: its curvature, heading and speed are drawn here over its metres."
@@ -72,8 +72,7 @@ def summary(name: str, profile: RouteProfile, violations: Sequence[Violation]) -
     tightest = float(np.abs(profile.curvatures).max())
     parts = [
         f"{profile.length:.1f} m",
-        f"{clock(profile.seconds)} min"
-        + (f" and {profile.stops} stop{'s' if profile.stops > 1 else ''}" if profile.stops else ""),
+        f"{clock(profile.seconds)} min" + (f" and {counted_text(profile.stops, 'stop')}" if profile.stops else ""),
         "straight" if tightest < 1e-6 else f"tightest curve {1.0 / tightest:.2f} m radius",
     ]
     if math.isfinite(profile.largest_curvature):

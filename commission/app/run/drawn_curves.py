@@ -6,7 +6,6 @@ Binned by the study `curves`; numbers travel as 32-bit floats, times after the b
 from __future__ import annotations
 
 import base64
-import json
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -175,8 +174,3 @@ def _at(run: RunResult, line: Line, cycle: int) -> list[float] | None:
     values = line.values(run, rows)
     values = values[np.isfinite(values)]
     return [float(values.min()), float(values.max())] if len(values) else None
-
-
-def as_text(message: object) -> str:
-    """Return a message as JSON, without a number that JSON does not know."""
-    return json.dumps(message, allow_nan=False, separators=(",", ":"))

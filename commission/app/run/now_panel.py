@@ -17,7 +17,7 @@ from commission.app.run.view import RunView
 from commission.app.run.wall_points import walls_told
 from commission.localization.detector import passing_widths
 from commission.localization.estimate import Estimate, Mode, Status
-from commission.site.quantity import DEGREES, MILLIMETRES
+from commission.site.quantity import DEGREES, MILLIMETRES, counted_text
 from commission.site.truth import truth_told
 from commission.studies.run import TWO_SIGMA, RunResult
 from commission.studies.scanner_figures import residuals_told
@@ -136,7 +136,7 @@ def _rejection(run: RunView, estimate: Estimate, row: int) -> tuple[str, str]:
     else:
         expected = "expected " + " or ".join(f"{low} to {high}" for low, high in passing)
     where = f"{distance:.2f} m, {DEGREES.text(bearing)}"
-    return f"Cluster at {where}", f"{beams} beam{'s' if beams > 1 else ''}, {expected}: rejected"
+    return f"Cluster at {where}", f"{counted_text(beams, 'beam')}, {expected}: rejected"
 
 
 def _of_scanners(result: RunResult) -> list[tuple[str, str]]:

@@ -6,17 +6,15 @@ values there. What is lived is drawn solid, what is computed behind the cursor p
 
 from __future__ import annotations
 
-import html
-from typing import Any
-
 from viser import GuiApi
 
 from commission.app.base import theme, viser_private
+from commission.app.base.carrier import Carrier
 from commission.app.base.panel import BasePanel, Post, posting
 from commission.app.base.view import PageView
 from commission.app.run.asked import action_of
 from commission.app.run.charts import BY_TITLE
-from commission.app.run.drawn_curves import as_text, drawn, values_at
+from commission.app.run.drawn_curves import drawn, values_at
 from commission.app.run.found_table import Found, message_of
 from commission.app.run.state import PlotWindow, RunState
 from commission.app.run.variant_reducer import VariantsState
@@ -88,32 +86,3 @@ class Plots(BasePanel):
 
     def _window(self, view: PageView) -> PlotWindow:
         return view.state.of_browser(self._browser, PlotWindow)
-
-
-class Carrier:
-    """An element of the page that nobody sees, with a message for the script.
-
-    Parameters
-    ----------
-    gui : where it is made.
-    kind : how the script finds it.
-    """
-
-    def __init__(self, gui: GuiApi, kind: str) -> None:
-        self._kind = kind
-        self._html = gui.add_html(self._element("", 0))
-        self._written, self._number = "", 0
-
-    def write(self, message: dict[str, Any]) -> None:
-        """Send a message unless it is the one that is there."""
-        text = as_text(message)
-        if text != self._written:
-            self._written = text
-            self._number += 1
-            self._html.content = self._element(text, self._number)
-
-    def _element(self, text: str, number: int) -> str:
-        return (
-            f"<div class='c-carried' data-kind='{self._kind}' data-number='{number}' "
-            f"data-message='{html.escape(text, quote=True)}'></div>"
-        )

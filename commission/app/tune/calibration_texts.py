@@ -6,7 +6,7 @@ import math
 
 from commission.app.base.panel import escaped, table
 from commission.app.tune.calibration_view import CalibrationView
-from commission.site.quantity import number_text
+from commission.site.quantity import counted_text, number_text
 from commission.studies.calibration_values import CalibrationVerdict, Value
 from commission.studies.calibration_words import label_of, stretches_of, text_of
 from commission.studies.variant_figures import BY_KEY
@@ -24,7 +24,9 @@ HEADS = {
 def summary_text(found: CalibrationView) -> str:
     """Say how many figures are proposed and accepted."""
     count, accepted = len(found.proposed), sum(each.is_accepted for each in found.proposed)
-    notes = [f"{count} figures proposed, {accepted} accepted." if count else "The drive proposes nothing."]
+    notes = [
+        f"{counted_text(count, 'figure')} proposed, {accepted} accepted." if count else "The drive proposes nothing."
+    ]
     if not found.is_of_drive:
         notes.append("Another drive is shown by now: calibrate again.")
     return _padded("".join(map(_note, notes)))

@@ -13,6 +13,7 @@ from commission.app.base.view import PageView
 from commission.app.tune.calibration_state import CalibrationState
 from commission.app.tune.map_check import CheckMap, CorrectMap, DropMapCheck, TickFinding
 from commission.app.tune.map_check_service import MAP_CHECK, FindingLine, MapCheckView
+from commission.site.quantity import counted_text
 from commission.studies.map_findings import MapFault, MapFinding
 
 
@@ -106,7 +107,7 @@ class MapCheckPanel(BasePanel):
 def summary_text(found: MapCheckView) -> str:
     """Say how much was found, and of what the drive tells nothing."""
     count = len(found.lines)
-    notes = [f"{count} finding{'s' if count > 1 else ''}." if count else "Every reflector in sight stands as mapped."]
+    notes = [f"{counted_text(count, 'finding')}." if count else "Every reflector in sight stands as mapped."]
     if found.found.unseen:
         notes.append(f"Hardly in sight on this drive, so nothing is said of: {', '.join(found.found.unseen)}.")
     if not found.is_of_drive:

@@ -14,6 +14,7 @@ from commission.geometry.angles import wrap_scalar
 from commission.geometry.occupancy import OccupancyGrid
 from commission.site.editing.snapping import WallPoint, nearest_wall
 from commission.site.floor_map import FREE, FloorMap
+from commission.site.quantity import counted_text
 from commission.site.reflectors import Reflector, ReflectorMap
 
 NEAR = 0.3
@@ -90,7 +91,8 @@ def _agreed(walls: list[WallPoint]) -> float | None:
 def said_of(faced: Faced) -> str:
     """Say how many plates have a direction now, and which have none."""
     rest = f"; {_left(faced)}" if faced.left else ""
-    return f"{len(faced.turned)} plates face away from their walls now{rest}"
+    one, several = "plate faces away from its wall", "plates face away from their walls"
+    return f"{counted_text(len(faced.turned), one, several)} now{rest}"
 
 
 def left_said(faced: Faced) -> str:

@@ -179,15 +179,30 @@ def test_a_problem_of_a_station_selects_it_and_flies_there(placed: AppState) -> 
 
 def test_the_table_lists_routes_and_stations_and_a_row_selects_and_flies(placed: AppState) -> None:
     server = start_server("127.0.0.1", 0)
-    tab = server.gui.add_tab_group().add_tab("Routes")
-    table = RouteTable(server.gui, lambda _action: None, ME, tab)
+    table = RouteTable(server.gui, lambda _action: None, ME)
     table.draw_slowly(PageView(state=placed))
-    assert [row.text.split("   ")[0] for row in table._shown] == [ROUTE, "Station 1"]
-    assert "100 mm" in table._shown[1].text
-    assert "1 of 2 reverse" in table._shown[0].text
-    assert table._selecting(1) == SelectPosed(PosedKey(PosedKind.STATION, "Station 1"), fly=True)
-    assert table._selecting(0) == actions.SelectControlPoint(ControlPoint(ROUTE), fly=True)
-    assert table._selecting(9) == page.Report("this row is gone", failed=False)
+    shown = {content.name: content for content in table.tables.shown}
+    assert {name: [row.key for row in content.rows] for name, content in shown.items()} == {
+        "routes": [ROUTE],
+        "stations": ["Station 1"],
+    }
+    station = dict(
+        zip([each.title for each in shown["stations"].columns], shown["stations"].rows[0].cells, strict=True)
+    )
+    assert station["Within [mm]"] == "100"
+    route = dict(zip([each.title for each in shown["routes"].columns], shown["routes"].rows[0].cells, strict=True))
+    assert (route["Segments"], route["Reverse"]) == ("2", "1")
+    row = '{"n": 1, "do": "row", "table": "%s", "key": "%s", "how": "only"}'
+    assert table.tables.asked(row % ("stations", "Station 1")) == SelectPosed(
+        PosedKey(PosedKind.STATION, "Station 1"), fly=True
+    )
+    assert table.tables.asked(row % ("routes", ROUTE)) == actions.SelectControlPoint(ControlPoint(ROUTE), fly=True)
+    cell = (
+        '{"n": 2, "do": "cell", "table": "stations", "key": "Station 1", "column": "required_accuracy", "text": "%s"}'
+    )
+    assert table.tables.asked(cell % "12,5") == SetPosed(PosedKind.STATION, "required_accuracy", 0.0125, "Station 1")
+    with pytest.raises(ValueError, match="Within is 0 mm; expected 1 to 10000 mm"):
+        table.tables.asked(cell % "0")
     server.stop()
 
 

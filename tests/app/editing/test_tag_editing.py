@@ -135,11 +135,16 @@ def test_a_field_of_a_station_sets_nothing_of_a_tag_that_was_selected_meanwhile(
 
 def test_the_table_lists_tags_and_a_row_selects_and_flies(placed: AppState) -> None:
     server = start_server("127.0.0.1", 0)
-    table = RouteTable(server.gui, lambda _action: None, ME, server.gui.add_tab_group().add_tab("Routes"))
+    table = RouteTable(server.gui, lambda _action: None, ME)
     state = after(placed, SetPosed(PosedKind.TAG, "heading", math.pi / 2))
     table.draw_slowly(PageView(state=state))
-    assert table._shown[-1].text == "tag T1   3.00  5.00 m  90.0°"
-    asked = table._selecting(len(table._shown) - 1)
+    listed = table.tables.shown[-1]
+    assert (listed.name, [each.title for each in listed.columns][:4]) == (
+        "tags",
+        ["Id", "x [m]", "y [m]", "Heading [°]"],
+    )
+    assert listed.rows[-1].cells[:4] == ("T1", "3", "5", "90")
+    asked = table.tables.asked('{"n": 1, "do": "row", "table": "tags", "key": "T1", "how": "only"}')
     assert asked == SelectPosed(PosedKey(PosedKind.TAG, "T1"), fly=True)
     assert outcome(state, asked).effects == (FlyTo((3.0, 5.0)),)
     server.stop()

@@ -67,7 +67,7 @@ def test_changes_of_a_route_are_said() -> None:
     aside = replace(line, control_points=np.array([[0.0, 0.3], [4.0, 0.3]]), direction=Direction.REVERSE)
     moved = route_changes(before, Route("Loop", (aside,), 0.8))
     assert moved == (
-        "Loop: course moves by up to 300 mm, 1 segments change between forward and reverse, speed 0.5 → 0.8 m/s"
+        "Loop: course moves by up to 300 mm, 1 segment changes between forward and reverse, speed 0.5 → 0.8 m/s"
     )
     same = Route("Loop", (replace(line, weights=np.ones(2)),), 0.5)
     assert route_changes(before, same) == "Loop: written otherwise, driven the same"

@@ -12,8 +12,8 @@ from commission.app.base.state import AppState
 from commission.app.editing.actions import (
     ChooseTool,
     DeleteRoute,
-    RenameRoute,
     SelectControlPoint,
+    SetRoute,
 )
 from commission.app.editing.editor import ControlPoint, Editor
 from commission.app.placement.actions import (
@@ -111,7 +111,7 @@ def test_a_route_that_does_not_count_keeps_to_it_under_another_name(project: Pro
     route = project.routes[0].name
     state = after(joined(AppState(project=project, saved=project)), CountRoute(route, counts=False))
     assert state.project.layout.ignored_routes == (route,)
-    state = after(state, SelectControlPoint(ControlPoint(route)), RenameRoute("Round"))
+    state = after(state, SelectControlPoint(ControlPoint(route)), SetRoute("name", "Round"))
     assert state.project.layout.ignored_routes == ("Round",)
     assert after(state, DeleteRoute()).project.layout.ignored_routes == ()
     assert after(state, CountRoute("Round", counts=True)).project.layout == project.layout

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from commission.app.base.actions import Action
+from commission.app.base.carrier import as_text
 from commission.app.base.effects import SendFile
 from commission.app.base.state import AppState
 from commission.app.editing.actions import SelectReflectors
@@ -20,7 +21,7 @@ from commission.app.run import actions
 from commission.app.run.asked import action_of
 from commission.app.run.charts import BY_TITLE, CHARTS, SHOWN_FIRST, ceiling
 from commission.app.run.curve_table import curve_table
-from commission.app.run.drawn_curves import as_text, axis_of, drawn, values_at
+from commission.app.run.drawn_curves import axis_of, drawn, values_at
 from commission.app.run.effects import MakeCurves
 from commission.app.run.state import PlotWindow
 from commission.geometry.arrays import read_only

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 import viser
 
+from commission.app.base.carrier import as_text
 from commission.app.base.server import start_server
 from commission.app.base.state import AppState
 from commission.app.base.view import view_of
 from commission.app.run import actions
-from commission.app.run.drawn_curves import as_text
 from commission.app.run.figure_layer import FigureLayer
 from commission.app.run.found_table import (
     BY_KEY,

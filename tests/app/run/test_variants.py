@@ -9,12 +9,13 @@ from dataclasses import replace
 
 import pytest
 
+from commission.app.base.carrier import as_text
 from commission.app.base.jobs import Jobs
 from commission.app.base.service import Context
 from commission.app.base.state import AppState
 from commission.app.run.asked import action_of
 from commission.app.run.charts import CHARTS, color_of
-from commission.app.run.drawn_curves import as_text, drawn, values_at
+from commission.app.run.drawn_curves import drawn, values_at
 from commission.app.run.variant_actions import DropRun, DropVariant, KeepRun, KeepVariant, UseVariant
 from commission.app.run.variant_reducer import LETTERS, VariantsState
 from commission.app.run.variant_runs import VariantRuns

@@ -81,5 +81,5 @@ def test_only_unlocked_plates_without_direction_change_and_the_rest_is_told() ->
     assert faced.left == ("L", "F")
     assert faced.reflectors.reflectors[1:] == before[1:]
     assert said_of(faced) == (
-        "1 plates face away from their walls now; L, F are locked, hang near no wall, or near several"
+        "1 plate faces away from its wall now; L, F are locked, hang near no wall, or near several"
     )
