@@ -138,7 +138,7 @@ def _report(entries: dict[str, int | float | None], options: FixOptions) -> list
 
     return [
         f"Floor        {entries['area_m2']:.0f} m2 in {entries['points']} points; "
-        f"{counted_text(entries['reflectors'], 'reflector')}",
+        f"{counted_text(int(entries['reflectors'] or 0), 'reflector')}",
         f"Heading      {_heading(options)}",
         f"Visible      1 or more on {share('share_1_visible')}, 2 on {share('share_2_visible')}, "
         f"3 on {share('share_3_visible')}",

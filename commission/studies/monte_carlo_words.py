@@ -26,10 +26,10 @@ def told(result: MonteCarloResult) -> list[str]:
         f"seed {inputs.seed}",
         f"Available    {PERCENT.of(result.availability):.3f} {PERCENT.unit} of the cycles; worst drive "
         f"{PERCENT.of(availability.min()):.2f} {PERCENT.unit}, "
-        f"{counted_text(np.count_nonzero(availability == 1.0), 'drive')} without any stop",
+        f"{counted_text(int(np.count_nonzero(availability == 1.0)), 'drive')} without any stop",
         f"Stops        {int(result.column('fail_episodes').sum())}, the longest of "
         f"{result.column('longest_fail').max():.1f} s; lost "
-        f"{counted_text(np.count_nonzero(result.column('lost_fraction')), 'drive')}",
+        f"{counted_text(int(np.count_nonzero(result.column('lost_fraction'))), 'drive')}",
         f"Error        {_listed(result.error_quantiles)}",
         f"Operational  {_listed(result.operational_error_quantiles)}",
         f"ANEES        {result.anees:.2f}, of the position {result.anees_position:.2f} (1 is consistent)",
