@@ -23,7 +23,7 @@ from commission.site.record_store import ScanStore
 from commission.site.recorded_mounting import LEANING
 from commission.site.scanner import Scanner
 from commission.studies.inputs import StudyInput
-from commission.studies.recording_overview import beams_in_words
+from commission.studies.recording_overview import beams_in_words, rates
 from commission.studies.reference_headings import are_degrees
 
 FASTEST = 15.0
@@ -234,15 +234,13 @@ def _span(begin_ns: int, end_ns: int, zero_ns: int) -> str:
 def _odometry(inputs: PlausibilityInput) -> Iterator[Finding]:
     stamps, rows = inputs.log.odometry_stamps_ns, inputs.log.displacements
     seconds = np.diff(stamps) * 1e-9
-    usable = seconds > 0.0
-    if usable.sum() < 2 or not _PERIODS_S[0] <= _period_s(stamps) <= _PERIODS_S[1]:
+    if (seconds > 0.0).sum() < 2 or not _PERIODS_S[0] <= _period_s(stamps) <= _PERIODS_S[1]:
         return
-    dt, motion = seconds[usable], rows[1:][usable]
-    speed = _high(np.hypot(motion[:, 0], motion[:, 1]) / dt)
-    turn = _high(np.abs(motion[:, 2]) / dt)
+    speeds = rates(stamps, np.hypot(rows[:, 0], rows[:, 1]))
+    speed, turn = _high(speeds), _high(rates(stamps, np.abs(rows[:, 2])))
     if speed > FASTEST:
         yield Finding(
-            found=f"the odometry moves at up to {np.max(np.hypot(motion[:, 0], motion[:, 1]) / dt):.0f} m/s",
+            found=f"the odometry moves at up to {np.max(speeds):.0f} m/s",
             probably=_instead_of_displacements(rows, stamps),
             remedy="expected dx, dy [m] and dtheta [rad] since the row before, in the base frame of the row before",
         )

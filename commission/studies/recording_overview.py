@@ -11,6 +11,9 @@ from commission.site.quantity import PERCENT, PLAIN_DEGREES, counted_text, numbe
 from commission.site.record_log import RecordLog
 from commission.site.record_store import ScanStore
 
+RATE_NS = 200_000_000
+"""Time over which a speed is taken [ns]: rows that were stamped as they arrived lie unevenly, some close together."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Channel:
@@ -94,15 +97,37 @@ def _channel(log: RecordLog, name: str, stamps_ns: IntArray, values: str) -> Cha
     )
 
 
+def rates(stamps_ns: IntArray, amounts: FloatArray) -> FloatArray:
+    """(M,) amount in a second, over the time that follows each row.
+
+    Parameters
+    ----------
+    stamps_ns : (N,) stamps of rows, ascending [ns].
+    amounts : (N,) what came since the row before [m] or [rad].
+
+    Returns
+    -------
+    rates : one for each row from which on there is such a time; of a shorter recording the one over all of it; empty
+        where no time passes.
+    """
+    if len(stamps_ns) < 2 or stamps_ns[-1] <= stamps_ns[0]:
+        return np.empty(0)
+    passed = np.cumsum(amounts)
+    ends = np.searchsorted(stamps_ns, stamps_ns + RATE_NS)
+    begins = np.flatnonzero(ends < len(stamps_ns))
+    if not len(begins):
+        begins, ends = np.array([0]), np.array([len(stamps_ns) - 1])
+    ends = ends[begins]
+    return (passed[ends] - passed[begins]) / ((stamps_ns[ends] - stamps_ns[begins]) * 1e-9)
+
+
 def _odometry_values(log: RecordLog) -> str:
-    seconds = np.diff(log.odometry_stamps_ns) * 1e-9
-    usable = seconds > 0.0
-    moved = log.displacements[1:][usable]
-    if not len(moved):
+    ways = np.hypot(log.displacements[:, 0], log.displacements[:, 1])
+    speeds = rates(log.odometry_stamps_ns, ways)
+    turns = rates(log.odometry_stamps_ns, np.abs(log.displacements[:, 2]))
+    if not len(speeds):
         return "no motion"
-    speeds = np.hypot(moved[:, 0], moved[:, 1]) / seconds[usable]
-    turns = np.abs(moved[:, 2]) / seconds[usable]
-    way = float(np.hypot(log.displacements[:, 0], log.displacements[:, 1]).sum())
+    way = float(ways.sum())
     fastest = f"speed up to {number_text(speeds.max())} m/s, turning up to {number_text(turns.max())} rad/s"
     return f"{way:.1f} m driven, {fastest}"
 

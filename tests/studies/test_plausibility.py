@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from commission.errors import JobCancelled
 from commission.site.record_log import RecordLog
 from commission.site.recorded_mounting import RecordedMounting
 from commission.studies.plausibility import Finding, PlausibilityInput, plausibility
+from commission.studies.recording_overview import channels
 from commission.studies.start import start_of
 from tests.studies.recorded import PROJECT, SECOND, drive, pose_at, scan_log
 
@@ -25,7 +27,7 @@ def only(log: RecordLog) -> Finding:
     return finding
 
 
-def with_scans(**scans: object) -> RecordLog:
+def with_scans(**scans: Any) -> RecordLog:
     log = drive(20.0)
     return dataclasses.replace(
         log,
@@ -57,6 +59,22 @@ def test_poses_in_the_odometry_are_told_with_the_speed_that_they_would_be() -> N
 def test_velocities_in_the_odometry_are_told() -> None:
     log = drive()
     assert "velocities" in only(dataclasses.replace(log, displacements=log.displacements * 50.0)).probably
+
+
+def test_rows_that_were_stamped_as_they_arrived_are_no_velocities() -> None:
+    log = drive()
+    stamps = log.odometry_stamps_ns.copy()
+    # In the first quarter, five rows come at once every tenth of a second, 30 us apart.
+    busy = len(stamps) // 20 * 5
+    stamps[:busy] += 30_000 * (np.arange(busy) % 5) - (stamps[:busy] - stamps[0]) % 100_000_000
+    assert np.all(np.diff(stamps) > 0)
+
+    assert judged(dataclasses.replace(log, odometry_stamps_ns=stamps)) == ()
+    told = channels(dataclasses.replace(log, odometry_stamps_ns=stamps))[0].values
+    fastest = float(told.split("speed up to ")[1].split(" m/s")[0])
+    true = float(np.hypot(*log.displacements[1:, :2].T).max() / 0.02)
+    # Over two tenths of a second, at whose ends one burst more or less may lie.
+    assert true <= fastest <= 1.6 * true
 
 
 def test_millimetres_and_degrees_in_the_odometry_are_told() -> None:
@@ -151,7 +169,7 @@ def test_reference_in_degrees_is_told_and_one_that_was_never_wrapped_is_not() ->
         start_of(PROJECT, dataclasses.replace(log, reference_poses=p)).belief.mean
         for p in (degrees, log.reference_poses)
     ]
-    np.testing.assert_allclose(*started, atol=1e-9)
+    np.testing.assert_allclose(started[0], started[1], atol=1e-9)
 
 
 def test_scans_of_which_no_beam_has_a_range_are_told() -> None:

@@ -114,6 +114,10 @@ def open_recording(path: Path, options: ChannelOptions = NO_OPTIONS) -> Recordin
     if packed:
         remedy = f"what is in it, unpacked ({packed[1]}), or of a ROS 2 bag its folder with metadata.yaml"
         raise FileFormatError(path, "", f"is packed as a whole ({packed[0]})", remedy)
+    bags = sorted(each.name for each in path.glob("*.bag")) if path.is_dir() else []
+    if bags:
+        found = f"is a folder with bags of ROS 1, {', '.join(bags[:3])}{' and others' if len(bags) > 3 else ''}"
+        raise FileFormatError(path, "", found, "one of them")
     raise FileFormatError(path, "", "is no recording", READ)
 
 

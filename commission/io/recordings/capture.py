@@ -28,10 +28,12 @@ class Capture(WholeRecording):
     def __init__(self, path: Path, options: ChannelOptions = NO_OPTIONS) -> None:
         """Open a capture; raises FileFormatError where it holds no telegram that is read."""
         self.path = path
-        senders = dict(_senders(path))
+        told = Counter[str]()
+        senders = dict(_senders(path, told))
         if not senders:
             remedy = "telegrams of SICK CoLa (LMDscandata), NAV350, Compact or safety scanners"
-            raise FileFormatError(path, "", "holds no telegram that is read", remedy)
+            why = "; ".join(f"{count} {what}" for what, count in told.items() if count)
+            raise FileFormatError(path, "", f"holds no telegram that is read{f' ({why})' if why else ''}", remedy)
         topics = [Topic(name=f"{name}/scan", type=kind, role=Role.SCAN) for name, kind in senders.items()]
         chosen = choose(path, topics, options) if options.channels else None
         if chosen is not None:
@@ -84,11 +86,11 @@ class Capture(WholeRecording):
                 yield payload.sender, found
 
 
-def _senders(path: Path) -> Iterator[tuple[str, str]]:
+def _senders(path: Path, told: Counter[str]) -> Iterator[tuple[str, str]]:
     """Address of each sender of telegrams that are read, and the name of their kind."""
     known: dict[str, str] = {}
     begins: dict[str, bytes] = {}
-    for payload in payloads(path):
+    for payload in payloads(path, told):
         if payload.sender in known:
             continue
         if payload.is_stream:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import heapq
 import tempfile
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from enum import StrEnum
@@ -29,6 +29,9 @@ from commission.site.records import Scan
 
 PATIENCE = 64
 """Scans of one scanner that may come before an earlier one: 2.5 s at 25 a second."""
+
+SET_BACK_NS = 5_000_000_000
+"""Way back of stamps from which it is a clock that was set, and no message that came late [ns]."""
 
 
 class MotionKind(StrEnum):
@@ -144,8 +147,10 @@ class Collector:
             int(store.stamps_ns[0]) for store in scans
         ]
         if not firsts:
-            raise FileFormatError(self.path, "", "holds no scan, odometry or pose", "a recording of a drive")
-        more = list(notes)
+            why = "; ".join(self._mended())
+            problem = f"holds no scan, odometry or pose{f' ({why})' if why else ''}"
+            raise FileFormatError(self.path, "", problem, "a recording of a drive")
+        more = [*notes, *self._set_clocks()]
         if not len(stamps):
             more.append("it holds no odometry: how the vehicle moved is not known")
             stamps, displacements = np.array([min(firsts)]), np.zeros((1, 3))
@@ -161,8 +166,26 @@ class Collector:
             detection_scanners=scanners,
             reference_stamps_ns=reference.stamps_ns,
             reference_poses=reference.rows,
-            notes=(*more, *(f"{count} {what}" for what, count in self.told.items() if count)),
+            notes=(*more, *self._mended()),
         )
+
+    def _mended(self) -> Iterator[str]:
+        """What was mended or left out, in words."""
+        return (f"{count} {what}" for what, count in self.told.items() if count)
+
+    def _set_clocks(self) -> Iterator[str]:
+        """Say of which records the stamps went back by more than lateness explains."""
+        backs = {
+            "odometry": _longest_way_back(self._motion_stamps.array()),
+            "reference": _longest_way_back(self._reference_stamps.array()),
+            **{f"scans of {name}": queue.way_back_ns for name, queue in zip(self.scanners, self._queues, strict=True)},
+        }
+        for name, way in backs.items():
+            if way > SET_BACK_NS:
+                yield (
+                    f"stamps of the {name} go back by {way * 1e-9:.1f} s: a clock was set, or began anew, in between, "
+                    "and what came after it lies before; cut the recording there"
+                )
 
     def _displacements(self) -> tuple[IntArray, FloatArray]:
         """Stamps [ns] and displacements [m, m, rad] from whatever kind of motion came."""
@@ -206,6 +229,11 @@ class Collector:
         return tuple(found)
 
 
+def _longest_way_back(stamps_ns: IntArray) -> int:
+    """By how much a stamp lies before a former one, at most [ns]."""
+    return int((np.maximum.accumulate(stamps_ns) - stamps_ns).max()) if len(stamps_ns) else 0
+
+
 def _moved(kind: MotionKind, stamps_ns: IntArray, rows: FloatArray, wheels: motion.Wheels | None) -> FloatArray:
     """(N, 3) displacements [m, m, rad] from sorted rows."""
     if kind is MotionKind.POSES:
@@ -233,6 +261,8 @@ class _ScanQueue:
         self._told = told
         self._waiting: list[tuple[int, int, Scan]] = []
         self._number = 0
+        self.way_back_ns = 0
+        """By how much a stamp lay before a former one, at most [ns]."""
         self._newest: int | None = None
         self._last: int | None = None
         self._first: Scan | None = None
@@ -240,6 +270,7 @@ class _ScanQueue:
     def add(self, scan: Scan) -> None:
         if self._newest is not None and scan.stamp_ns < self._newest:
             self._told["scans came after a later one and are sorted"] += 1
+            self.way_back_ns = max(self.way_back_ns, self._newest - scan.stamp_ns)
         self._newest = scan.stamp_ns if self._newest is None else max(self._newest, scan.stamp_ns)
         heapq.heappush(self._waiting, (scan.stamp_ns, self._number, scan))
         self._number += 1

@@ -95,7 +95,7 @@ def payloads(path: Path, told: Counter[str] | None = None, senders: Collection[s
     hosts = None if senders is None else {sender.rpartition(":")[0] for sender in senders}
     fragments, streams = _Fragments(told, hosts), _Streams(told)
     for captured, link, packet in packets(path, told):
-        found = fragments.datagram(captured, _network(link, packet))
+        found = fragments.datagram(captured, _network(link, packet, told))
         if found is None:
             continue
         stamp, protocol, source, target, data = found
@@ -226,18 +226,22 @@ def _check(path: Path, offset: int, length: int) -> None:
         raise FileFormatError(path, f"byte {offset}", f"a packet of {length} bytes", f"{PACKET_LIMIT} at most")
 
 
-def _network(link: int, packet: bytes) -> bytes:
+def _network(link: int, packet: bytes, told: Counter[str]) -> bytes:
     """IPv4 packet in a packet of a link; empty where it is another one."""
     begin = _LINK_BYTES.get(link)
     if begin is None:
+        told[f"packets are of link type {link}, which is not read (Ethernet is 1)"] += 1
         return b""
     if link == 1:
         # IEEE 802.1Q: four bytes for each virtual network before the kind of what follows.
         while packet[begin - 2 : begin] in (b"\x81\x00", b"\x88\xa8"):
             begin += 4
-        if packet[begin - 2 : begin] != b"\x08\x00":
+        if packet[begin - 2 : begin] not in (b"\x08\x00", b"\x86\xdd"):
             return b""
-    return packet[begin:] if len(packet) > begin and packet[begin] >> 4 == 4 else b""
+    if len(packet) <= begin or packet[begin] >> 4 != 4:
+        told["packets are of IPv6, which is not read"] += len(packet) > begin and packet[begin] >> 4 == 6
+        return b""
+    return packet[begin:]
 
 
 class _Fragments:

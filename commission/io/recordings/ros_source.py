@@ -5,7 +5,10 @@ It knows no record of ours. Types come from the bag; a bag without definitions i
 
 from __future__ import annotations
 
+import shutil
 import struct
+import tempfile
+import weakref
 from collections.abc import Collection, Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -170,6 +173,7 @@ class RosbagsSource:
         self._missing = missing_parts(path, files) if path.is_dir() else ()
         self.notes: tuple[str, ...] = (*self._missing, *unmerged(files))
         self._is_ros1 = path.is_file() and _begins_with(path, ROS1_MAGIC)
+        self._named = self._with_ending(".bag" if self._is_ros1 else ".db3")
         with _told(path), self._reader() as reader:
             found: dict[str, tuple[str, int]] = {}
             for connection in reader.connections:
@@ -177,13 +181,27 @@ class RosbagsSource:
                 found[connection.topic] = connection.msgtype, count
         self.topics = tuple(BagTopic(name, kind, count) for name, (kind, count) in found.items())
 
+    def _with_ending(self, ending: str) -> Path:
+        """Path by which the library, which goes by endings, takes the bag for what it is: a link where it has none."""
+        if self.path.is_dir() or self.path.suffix == ending:
+            return self.path
+        try:
+            folder = Path(tempfile.mkdtemp())
+            weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+            link = folder / f"bag{ending}"
+            link.symlink_to(self.path.resolve())
+        except OSError as error:
+            found = f"is a bag that ends in {self.path.suffix!r}"
+            raise FileFormatError(self.path, "", found, f"a name that ends in {ending}") from error
+        return link
+
     def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:
         """Deliver the messages of some topics in the order of their recording; raises FileFormatError."""
         with _told(self.path), self._reader() as reader:
             chosen = [connection for connection in reader.connections if connection.topic in topics]
             if not chosen:
                 return
-            for connection, stamp, data in reader.messages(connections=chosen):
+            for connection, stamp, data in _plain(reader.messages(connections=chosen)):
                 plain = data if self._is_ros1 else unpacked_message(data)
                 yield BagMessage(connection.topic, stamp, reader.deserialize(plain, connection.msgtype))
 
@@ -192,7 +210,7 @@ class RosbagsSource:
         store = ros2_types()
         with _told(self.path), self._reader() as reader:
             chosen = [connection for connection in reader.connections if connection.topic in topics]
-            for connection, stamp, data in reader.messages(connections=chosen) if chosen else ():
+            for connection, stamp, data in _plain(reader.messages(connections=chosen)) if chosen else ():
                 if self._is_ros1 and connection.msgtype not in store.fielddefs:
                     learn_type(store, connection.msgtype, connection.msgdef.data)
                 whole = store.ros1_to_cdr(data, connection.msgtype) if self._is_ros1 else data
@@ -203,13 +221,21 @@ class RosbagsSource:
         from rosbags.typesys import Stores, get_typestore
 
         store = get_typestore(Stores.ROS1_NOETIC if self._is_ros1 else Stores.ROS2_HUMBLE)
-        paths = [_with_suffix(self.path, self._is_ros1)]
+        paths = [self._named]
         files = files_of(self.path, ".db3") if self.path.is_dir() else []
         if files and (self._missing or not (self.path / METADATA).is_file()):
             # A recorder writes the metadata when it ends: where it was stopped, the files stand alone. By the metadata
             # the library wants all of them.
             paths = files
         return AnyReader(paths, default_typestore=store)
+
+
+def _plain(messages: Iterator[tuple[Any, Any, Any]]) -> Iterator[tuple[Any, int, bytes]]:
+    """Deliver messages whose time and content are what they shall be: a cell of sqlite holds whatever it likes."""
+    for connection, stamp, data in messages:
+        if not isinstance(stamp, int) or not isinstance(data, bytes | memoryview):
+            raise ValueError(f"a message of {connection.topic} has no time or no content")
+        yield connection, stamp, bytes(data)
 
 
 def ros2_types() -> Typestore:
@@ -232,16 +258,6 @@ def learn_type(store: Typestore, kind: str, definition: str) -> None:
 
     types = get_types_from_msg(definition, kind)
     store.register({name: fields for name, fields in types.items() if name not in store.fielddefs})
-
-
-def _with_suffix(path: Path, is_ros1: bool) -> Path:
-    """Raise FileFormatError where the library, which goes by endings, would take a bag for another kind."""
-    if path.is_dir():
-        return path
-    wanted = ".bag" if is_ros1 else ".db3"
-    if path.suffix != wanted:
-        raise FileFormatError(path, "", f"is a bag that ends in {path.suffix!r}", f"a name that ends in {wanted}")
-    return path
 
 
 def _begins_with(path: Path, magic: bytes) -> bool:

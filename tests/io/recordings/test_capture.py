@@ -191,3 +191,55 @@ def test_real_turns_of_a_picoscan_are_put_together(tmp_path: Path, shared_data: 
     # 96 segments; the turns at both ends are cut.
     assert len(log.scans[0]) == 18
     assert set(log.scans[0].beams.tolist()) == {1200}
+
+
+def test_capture_of_what_is_not_read_says_what_it_holds(tmp_path: Path) -> None:
+    content = bytearray(safety_capture(tmp_path, fragments(instance(60), 1)).read_bytes())
+    content[20:24] = struct.pack("<I", 105)
+    (tmp_path / "wifi.pcap").write_bytes(content)
+    head = struct.pack(">IHBB16s16s", 0x60000000, 9, 17, 64, bytes(16), bytes(16))
+    six = made.write_pcap(tmp_path / "six.pcap", [(START, bytes(12) + b"\x86\xdd" + head + made.udp(b"x"))])
+
+    with pytest.raises(FileFormatError, match=r"\(1 packets are of link type 105, which is not read"):
+        load_log(tmp_path / "wifi.pcap")
+    with pytest.raises(FileFormatError, match=r"\(1 packets are of IPv6, which is not read\)"):
+        load_log(six)
+
+
+def test_capture_whose_packets_are_all_cut_short_says_so(tmp_path: Path) -> None:
+    packets = [(START, made.ip(17, made.udp(part))[:96]) for part in fragments(instance(), 1)]
+
+    with pytest.raises(FileFormatError, match=r"holds no scan, .*packets of 192.168.0.1 were captured in part only"):
+        load_log(made.write_pcap(tmp_path / "a.pcap", packets))
+
+
+def test_packets_of_several_interfaces_have_each_their_link_and_their_unit_of_time(tmp_path: Path) -> None:
+    def block(kind: int, body: bytes) -> bytes:
+        body += bytes(-len(body) % 4)
+        return struct.pack("<II", kind, 12 + len(body)) + body + struct.pack("<I", 12 + len(body))
+
+    def packet(interface: int, ticks: int, data: bytes) -> bytes:
+        return block(6, struct.pack("<5I", interface, ticks >> 32, ticks & 0xFFFFFFFF, len(data), len(data)) + data)
+
+    whole = made.ip(17, made.udp(b"hello"))
+    content = block(0x0A0D0D0A, struct.pack("<IHHq", 0x1A2B3C4D, 1, 0, -1))
+    content += block(1, struct.pack("<HHI", 1, 0, 0))
+    # Raw IP in nanoseconds, 1,000 s of which are left out of each stamp.
+    options = struct.pack("<HHB3xHHqHH", 9, 1, 9, 14, 8, 1_000, 0, 0)
+    content += block(1, struct.pack("<HHI", 101, 0, 0) + options)
+    content += packet(0, START // 1_000, whole) + packet(1, START - 1_000 * 10**9 + 5, whole[14:])
+    (tmp_path / "a.pcapng").write_bytes(content)
+
+    found = [(payload.stamp_ns, payload.data) for payload in payloads(tmp_path / "a.pcapng")]
+
+    assert found == [(START // 1_000 * 1_000, b"hello"), (START + 5, b"hello")]
+
+
+@pytest.mark.parametrize("tags", [1, 2])
+def test_packets_of_virtual_networks_are_read(tmp_path: Path, tags: int) -> None:
+    whole = made.ip(17, made.udp(b"hello"))
+    tagged = whole[:12] + b"\x81\x00\x00\x05" * tags + whole[12:]
+
+    found = list(payloads(made.write_pcap(tmp_path / "a.pcap", [(START, tagged)])))
+
+    assert [payload.data for payload in found] == [b"hello"]

@@ -3,6 +3,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import apsw
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -12,6 +13,7 @@ from commission.errors import CommissionError, FileFormatError, UsageError
 from commission.io.recordings.base import load_log, open_recording
 from commission.io.recordings.channels import ChannelOptions
 from commission.io.recordings.motion import Wheels
+from commission.io.recordings.writers import write_records
 from commission.site.record_log import RecordLog
 from commission.site.records import Odometry, ReferencePose, Scan
 from tests.io.recordings import ros_bags as bags
@@ -392,3 +394,52 @@ def test_farthest_range_itself_is_no_return_and_a_scan_that_is_all_beyond_it_is_
 def test_a_frame_whose_plane_does_not_lie_level_is_told(tmp_path: Path) -> None:
     leaning = bags.transform(START, "base_link", "laser", (1.0, 0.5, 0.0), pitch=math.pi / 2)
     assert any("its plane leaning by 90 deg" in note for note in read(tmp_path, [leaning, *drive()]).notes)
+
+
+@pytest.mark.parametrize("make", ["others", "own"])
+@pytest.mark.parametrize("column", ["timestamp", "data"])
+def test_cell_of_sqlite_that_holds_nothing_is_told(tmp_path: Path, make: str, column: str) -> None:
+    if make == "own":
+        write_records(tmp_path / "drive.db3", [Odometry(START, np.zeros(3))])
+        file = tmp_path / "drive.db3"
+    else:
+        file = next(written(tmp_path, ".db3", drive()).glob("*.db3"))
+    connection = apsw.Connection(str(file))
+    connection.execute(f"ALTER TABLE messages RENAME COLUMN {column} TO old")
+    connection.execute(f"ALTER TABLE messages ADD COLUMN {column}")
+    connection.close()
+
+    with pytest.raises(FileFormatError, match="has no time or no content"):
+        load_log(file)
+
+
+@pytest.mark.parametrize("kind", [".bag", ".db3"])
+def test_bag_of_another_name_is_known_by_its_content(tmp_path: Path, kind: str) -> None:
+    path = written(tmp_path, kind, drive())
+    file = path if path.is_file() else next(path.glob("*.db3"))
+    other = file.rename(tmp_path / ("drive.db3" if kind == ".bag" else "drive of tuesday"))
+
+    assert len(load_log(other).scans[0]) == 4
+    with pytest.raises(FileFormatError, match=r"folder with bags of ROS 1, a\.bag, b\.bag; expected one of them"):
+        (tmp_path / "two").mkdir()
+        (tmp_path / "two" / "a.bag").write_bytes(other.read_bytes())
+        (tmp_path / "two" / "b.bag").write_bytes(other.read_bytes())
+        load_log(tmp_path / "two")
+
+
+@pytest.mark.parametrize(("back_s", "is_told"), [(4.0, False), (6.0, True), (3600.0, True)])
+def test_clock_that_was_set_back_while_a_bag_was_recorded_is_told(tmp_path: Path, back_s: float, is_told: bool) -> None:
+    stamps = [START + step * TENTH - (round(back_s * 1e9) if step >= 30 else 0) for step in range(60)]
+    messages: list[bags.Message] = []
+    for step, stamp in enumerate(stamps):
+        for topic, kind, _, make in (bags.odometry(stamp, (0.1 * step, 0.0, 0.0)), bags.scan(stamp, ECHO)):
+            messages.append((topic, kind, START + step * TENTH, make))
+
+    told = [note for note in read(tmp_path, messages).notes if "go back by" in note]
+
+    # From the stamp before to the next one a tenth of a second would have passed.
+    way = f"go back by {back_s - 0.1:.1f} s: a clock was set, or began anew"
+    assert [note.partition(" go back")[0] for note in told] == (
+        ["stamps of the odometry", "stamps of the scans of scanner"] if is_told else []
+    )
+    assert all(way in note for note in told)
