@@ -64,6 +64,12 @@ class MatchRule(NamedTuple):
     """1-sigma of the distance of a beam's end from its contour [m]."""
 
 
+PROBED = 4
+"""Cells to both sides of a match in which a place that costs less is looked for: walls are seldom thicker."""
+PROBES = 3
+"""Of so many points one is enough for that."""
+
+
 class Cost(NamedTuple):
     """Cost of a pose, its gradient, and half of its second derivative, which is symmetric; angles times the lever."""
 
@@ -224,12 +230,77 @@ def match(start: GridPose, lever: float, points: FloatArray, tables: ContourTabl
     Notes
     -----
     No formula: `minimized` with all points, `histogram_threshold` there, `minimized` with what it leaves; both are
-    Sobreira et al. 2015, section 3.
+    Sobreira et al. 2015, section 3. Then, where `beside` finds a place that costs less, again from there.
     """
     pose, used = minimized(start, lever, points, tables, rule, math.inf)
     threshold = histogram_threshold(pose, points, tables, rule)
     pose, again = minimized(pose, lever, points, tables, rule, threshold)
-    return Match(pose, histogram_threshold(pose, points, tables, rule), used + again)
+    used += again
+    other = beside(pose, lever, points, tables, rule, threshold)
+    if other.u != pose.u or other.v != pose.v:
+        pose, again = minimized(other, lever, points, tables, rule, threshold)
+        used += again
+    return Match(pose, histogram_threshold(pose, points, tables, rule), used)
+
+
+@compiled
+def beside(  # noqa: PLR0917 - a pose and the points
+    pose: GridPose, lever: float, points: FloatArray, tables: ContourTables, rule: MatchRule, threshold: float
+) -> GridPose:
+    """Return the least costly of the places some cells beside a pose, the pose itself where that costs least.
+
+    Parameters
+    ----------
+    pose, lever, points, tables, rule, threshold : as in `minimized`.
+
+    Notes
+    -----
+    pose + k e, k from -`PROBED` to `PROBED` cells, e the direction that the second derivative of the cost says least of
+    (derived). A wall has two faces: where few beams tell a direction, and a heading that was off has carried their ends
+    through a thin wall, its far face holds the pose, as sure of itself as the right one.
+    """
+    few = points[::PROBES]
+    at = cost_of(pose, lever, few, tables, rule.length, threshold, False)
+    # The eigenvector of the smaller eigenvalue of ((xx, xy), (xy, yy)).
+    angle = 0.5 * math.atan2(2.0 * at.xy, at.xx - at.yy) + 0.5 * math.pi
+    c, s = math.cos(angle), math.sin(angle)
+    best, least = pose, facing_cost(pose, few, tables, rule.length, threshold)
+    for k in range(1, PROBED + 1):
+        for sign in (-1.0, 1.0):
+            tried = GridPose(pose.u + sign * k * c, pose.v + sign * k * s, pose.theta)
+            cost = facing_cost(tried, few, tables, rule.length, threshold)
+            if cost < least:
+                best, least = tried, cost
+    return best
+
+
+@compiled_inline
+def facing_cost(pose: GridPose, points: FloatArray, tables: ContourTables, length: float, threshold: float) -> float:
+    """Cost of a pose in which a beam that has come through a wall matches nothing.
+
+    Parameters
+    ----------
+    pose, points, tables, length, threshold : as in `cost_of`.
+
+    Notes
+    -----
+    `cost_of`, where d counts only if it does not grow over the last cell of the beam (derived): before the face that
+    stops a beam it falls; behind the middle of the wall it rises.
+    """
+    c, s = math.cos(pose.theta), math.sin(pose.theta)
+    l2, total = length * length, 0.0
+    beyond = 1.0 - l2 / (l2 + threshold * threshold)
+    for i in range(len(points)):
+        px, py = points[i, 0], points[i, 1]
+        ax, ay = c * px - s * py, s * px + c * py
+        d = read_distance(tables.distances, pose.u + ax, pose.v + ay).distance
+        if not abs(d) <= threshold:
+            total += beyond
+            continue
+        short = max(1.0 - 1.0 / max(math.sqrt(px * px + py * py), 1.0), 0.0)
+        comes_through = read_distance(tables.distances, pose.u + short * ax, pose.v + short * ay).distance < d
+        total += beyond if comes_through else 1.0 - l2 / (l2 + d * d)
+    return total
 
 
 @compiled_inline

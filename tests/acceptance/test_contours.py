@@ -147,7 +147,6 @@ def cut_out(floor: FloorMap, pose, reach: float) -> FloorMap:
 
 
 def test_with_30_percent_of_the_beams_on_people_and_boxes_the_error_stays_under_20_mm(floor, seeds):
-    """In 98 of 100 places: where a few beams alone tell a direction, a box may stand for what they should meet."""
     rng = np.random.default_rng(1)
     errors, shares = [], []
     for truth in places(floor, len(seeds(4, 60)), rng):
@@ -161,7 +160,7 @@ def test_with_30_percent_of_the_beams_on_people_and_boxes_the_error_stays_under_
     assert len(errors) >= 0.7 * len(shares)
     assert min(shares) >= 0.3
     print(f"with obstacles {1e3 * np.median(errors):.2f} mm, at worst {1e3 * max(errors):.2f}")  # noqa: T201 - README
-    assert np.mean(np.array(errors) < 0.02) >= 0.98
+    assert max(errors) < 0.02
 
 
 def test_starts_half_a_metre_and_15_degrees_off_converge(floor, seeds):

@@ -12,6 +12,7 @@ from scipy.ndimage import map_coordinates
 from scipy.optimize import least_squares
 
 from commission.compiled import compiled
+from commission.geometry import se2
 from commission.geometry.angles import wrap
 from commission.geometry.occupancy import OccupancyGrid
 from commission.localization.contour_match import (
@@ -25,6 +26,7 @@ from commission.localization.contour_match import (
     match,
 )
 from commission.localization.contour_tables import contour_tables, distances_at, read_distance, signed_distances
+from commission.site.floor_map import FREE, OCCUPIED, FloorMap
 from tests.localization.contour_halls import grid_pose, map_pose, points_of, room, scan_from
 
 RULE = MatchRule(False, 0.2, 50, 1e-4, 0.5, 0.01)
@@ -171,6 +173,21 @@ def test_match_finds_the_truth_in_a_hall_moved_and_turned(rule, origin):
     found = match(GridPose(*np.add(moved, (3.0, 2.0, -0.05))), 80.0, points, tables, rule)
     assert np.hypot(*((np.array(found.pose) - moved)[:2] * floor.resolution)) < 2e-3
     assert abs(found.pose.theta - moved[2]) < 1e-3
+
+
+@pytest.mark.parametrize("rule", [RULE, RPROP], ids=["Gauss-Newton", "RPROP"])
+@pytest.mark.parametrize("thick", [1, 2, 4])
+@pytest.mark.parametrize("yaw", [0.0, 0.5])
+def test_the_far_face_of_a_thin_wall_holds_no_match(rule, thick, yaw):
+    """Few beams tell the place along a corridor; a start from which they end beyond its end's middle draws them on."""
+    cells = np.full((80, 400), FREE, np.uint8)
+    cells[8:10] = cells[-10:-8] = OCCUPIED
+    cells[:, 300 : 300 + thick] = OCCUPIED
+    floor = FloorMap(cells, 0.05, np.array((0.0, 0.0, yaw)))
+    truth = se2.compose((0.0, 0.0, yaw), (8.0, 2.1, 0.1))
+    points, right = seen(floor, truth, noise=0.005), np.array(grid_pose(floor, truth))
+    found = match(GridPose(*np.add(right, (thick + 0.2, 0.0, 0.0))), 80.0, points, contour_tables(floor), rule)
+    assert np.hypot(*((np.array(found.pose) - right)[:2] * floor.resolution)) < 5e-3
 
 
 def test_rprop_ends_when_its_steps_are_small_and_never_after_its_iterations():
