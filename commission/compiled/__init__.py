@@ -8,12 +8,15 @@ from __future__ import annotations
 import hashlib
 import pickle
 import sys
+import threading
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 import llvmlite
 import numba
+from numba.core import event as _events
 
 from commission.compiled.digest import kernel_digest, named_fields
 from commission.compiled.kernel_files import KernelFiles, usual_folders
@@ -113,6 +116,54 @@ class KernelCache:
         made_for = repr((self._digest, versions, switches, codegen.magic_tuple(), str(sig), fields))
         name = f"{function.__module__}.{function.__qualname__}".replace("<", "").replace(">", "")
         return f"{name[:150]}-{hashlib.sha256(made_for.encode()).hexdigest()[:32]}.kernel"
+
+
+class _Hearing(threading.local):
+    """Who hears, in this thread, of what it compiles; kernels compile within each other."""
+
+    told: Callable[[bool], None] | None = None
+    depth = 0
+
+
+class _Compilations(_events.Listener):
+    """Hears of all that numba compiles in this program, and tells of it who listens in the thread that does."""
+
+    def __init__(self) -> None:
+        self.hearing = _Hearing()
+
+    def on_start(self, event: Any) -> None:  # noqa: ARG002 - numba's
+        """A kernel begins to compile."""
+        self.hearing.depth += 1
+        if self.hearing.depth == 1 and self.hearing.told is not None:
+            self.hearing.told(True)
+
+    def on_end(self, event: Any) -> None:  # noqa: ARG002 - numba's
+        """One has been compiled, or cannot be."""
+        self.hearing.depth -= 1
+        if self.hearing.depth == 0 and self.hearing.told is not None:
+            self.hearing.told(False)
+
+
+_COMPILATIONS = _Compilations()
+_events.register("numba:compile", _COMPILATIONS)
+
+
+@contextmanager
+def telling_of_compilations(told: Callable[[bool], None]) -> Generator[None]:
+    """Tell when this thread begins to compile kernels, and when it has ended; loading compiled ones is not told.
+
+    Which kernels a study needs depends on its input, and on what is on disk: nobody can say so beforehand.
+
+    Parameters
+    ----------
+    told : called with True at the beginning, and with False at the end, by the thread that compiles.
+    """
+    hearing = _COMPILATIONS.hearing
+    before, hearing.told = hearing.told, told
+    try:
+        yield
+    finally:
+        hearing.told = before
 
 
 def _named_tuples(kind: Any) -> Iterator[Any]:

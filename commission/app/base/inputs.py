@@ -196,7 +196,7 @@ class WorkBar:
         note = ""
         if job is not None:
             write(self._bar, PERCENT.of(job.fraction))
-            note = f"{job.message} {job.fraction:.0%}"
+            note = f"{job.does} {job.fraction:.0%}"
         elif waiting is not None:
             ahead = next((each for each in view.jobs if each.lane is waiting.lane), None)
             note = "waiting" if ahead is None else f"first: {ahead.name} {ahead.fraction:.0%}"

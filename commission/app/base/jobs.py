@@ -16,14 +16,18 @@ import time
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import partial
 from queue import SimpleQueue
 from typing import Any, TypeVar
 
+from commission.compiled import telling_of_compilations
 from commission.errors import CommissionError, JobCancelled, JobError, fault_line
 from commission.progress import Progress
 
 _log = logging.getLogger(__name__)
 
+COMPILING = "compiling"
+"""Said of a job that compiles kernels."""
 _QUIET_S = 0.05
 """Shortest time between two reports of progress: 20 a second look smooth and do not crowd out other actions."""
 
@@ -85,6 +89,9 @@ class Job:
     message: str = ""
     """What it does now, in one line."""
 
+    compiles: bool = False
+    """Whether it compiles kernels at the moment: the first of their kind take up to a minute, without progress."""
+
     error: str = ""
     """Why it failed, in one line; empty unless it did."""
 
@@ -93,9 +100,16 @@ class Job:
             raise ValueError(f"fraction is {self.fraction}; expected 0 to 1")
 
     @property
+    def does(self) -> str:
+        """What it does now; that it compiles kernels is part of it."""
+        if not self.compiles or COMPILING in self.message:
+            return self.message
+        return f"{self.message}, {COMPILING}" if self.message else COMPILING
+
+    @property
     def line(self) -> str:
         """How it stands, in one line."""
-        return f"{self.name}{self.message and ': '}{self.message} {self.fraction:.0%}"
+        return f"{self.name}{self.does and ': '}{self.does} {self.fraction:.0%}"
 
     @property
     def has_ended(self) -> bool:
@@ -290,7 +304,8 @@ class Jobs:
         """Do one job and record how it ended."""
         state, result, error = JobState.DONE, None, ""
         try:
-            result = work(self._progress_of(number))
+            with telling_of_compilations(partial(self._compiles, number)):
+                result = work(self._progress_of(number))
         except JobCancelled:
             state = JobState.CANCELLED
         except Exception as problem:
@@ -302,7 +317,12 @@ class Jobs:
                 state, result, error = JobState.CANCELLED, None, ""
             job = self._unfinished[number]
             fraction = 1.0 if state is JobState.DONE else job.fraction
-            self._record(replace(job, state=state, fraction=fraction, error=error), result)
+            self._record(replace(job, state=state, fraction=fraction, error=error, compiles=False), result)
+
+    def _compiles(self, number: int, compiles: bool) -> None:
+        """Say that a job compiles kernels now, or does not any more."""
+        with self._lock:
+            self._record(replace(self._unfinished[number], compiles=compiles))
 
     def _progress_of(self, number: int) -> Progress:
         """What the work of this job calls."""

@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator
 from queue import Empty, SimpleQueue
 
+import numba
 import pytest
 
 from commission.app.base.jobs import Job, JobReport, Jobs, JobState, Lane
@@ -82,6 +83,39 @@ def test_every_new_message_is_reported_with_its_fraction(owner: Owner) -> None:
         (0.25, "rays"),
         (0.75, "ellipses"),
     ]
+
+
+def test_a_job_says_when_it_compiles_and_when_it_is_through(owner: Owner) -> None:
+    # Of no cache: it would compile in the first run of the tests alone.
+    inner = numba.njit(lambda x: 2.0 * x)
+    kernel = numba.njit(lambda x: inner(x) + 1.0)
+
+    def work(progress: Progress) -> float:
+        progress(0.5, "halving")
+        found = kernel(3.0)
+        progress(0.6, "halved")
+        # The second time nothing compiles.
+        return found + kernel(4.0)
+
+    reports = owner.reports_until_the_end_of(owner.jobs.start("Halve", work))
+    assert [report.job.line for report in reports[2:]] == [
+        *("Halve: halving 50%", "Halve: halving, compiling 50%", "Halve: halving 50%"),
+        *("Halve: halved 60%", "Halve: halved 100%"),
+    ]
+    assert reports[-1].result == 16.0
+
+
+def test_what_another_thread_compiles_is_not_said_of_a_job(owner: Owner) -> None:
+    others = numba.njit(lambda x: 3.0 * x)
+
+    def work(progress: Progress) -> None:
+        progress(0.5, "waiting")
+        thread = threading.Thread(target=others, args=(1.0,))
+        thread.start()
+        thread.join()
+
+    reports = owner.reports_until_the_end_of(owner.jobs.start("Wait", work))
+    assert not any(report.job.compiles for report in reports)
 
 
 @pytest.mark.measures_time
