@@ -24,7 +24,7 @@ from commission.app.base.state import AppState
 from commission.app.base.view import view_of
 from commission.app.coverage.heat_legend import heat_scale, reading_table
 from commission.app.coverage.scale import FIRST, QUANTITIES, Scale
-from commission.app.coverage.settings import Figure
+from commission.app.coverage.settings import BY_TAGS, Figure
 from commission.app.coverage.view import FloorReading, HeatView
 from commission.app.coverage.words import value_text
 from commission.app.failures.failure_panel import ranking_table
@@ -543,6 +543,8 @@ def test_a_color_begins_at_the_bound_that_its_legend_names(
     [
         (Figure.POSITION_SIGMA, (10.0, 20.0), (87.0, 43.5)),
         (Figure.HEADING_SIGMA, (0.5, 1.0), (DEGREES * 0.061, 0.5 * DEGREES * 0.061)),
+        (Figure.TAG_POSITION, (10.0, 20.0), (87.0, 43.5)),
+        (Figure.TAG_HEADING, (0.5, 1.0), (DEGREES * 0.061, 0.5 * DEGREES * 0.061)),
     ],
 )
 def test_the_legend_names_bounds_shares_and_the_limit_of_two_sigma_and_of_one(
@@ -556,7 +558,7 @@ def test_the_legend_names_bounds_shares_and_the_limit_of_two_sigma_and_of_one(
         outdated=False,
     )
     shown = heat_scale(heat, AppState(project=site, saved=site))
-    assert "no fix: 12.3 % of the floor" in shown
+    assert f"{'no tag in sight' if figure in BY_TAGS else 'no fix'}: 12.3 % of the floor" in shown
     text = [each for each in re.split(r"<[^>]*>", shown) if each]
     for number in (*(f"{bound:g}" for bound in bounds), "50", "25", "13"):
         assert number in text

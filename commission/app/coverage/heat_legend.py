@@ -12,7 +12,7 @@ from commission.app.base.ramp import cell_html, ramp_html, scales_html
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
 from commission.app.coverage.scale import NO_FIX_COLORS
-from commission.app.coverage.settings import BY_CONTOURS, CoverageSettings, Figure
+from commission.app.coverage.settings import BY_CONTOURS, BY_TAGS, COUNTED, CoverageSettings, Figure
 from commission.app.coverage.view import EllipseView, FloorReading, HeatView, coverage_of
 from commission.app.coverage.words import FIGURE_NAMES, HEADING_NAMES, MEASUREMENT_NAMES, none_text, value_text
 from commission.planning.error_budget import CONTRIBUTIONS
@@ -46,7 +46,7 @@ def heat_scale(heat: HeatView, state: AppState) -> str:
     shares = [PERCENT.number(share) for share in heat.shares[1:]]
     none = none_text(heat.scale.figure)
     hatch = HATCH_CSS.format(*(theme.css(color) for color in NO_FIX_COLORS))
-    counts = _count_labels(heat) if heat.scale.figure is Figure.VISIBLE else None
+    counts = _count_labels(heat) if heat.scale.figure in COUNTED else None
     lines = [
         ramp_html([theme.css(color) for color in tuples], bounds, counts),
         f"<div style='display:flex;justify-content:space-between;font-size:10px;opacity:.7'>"
@@ -99,6 +99,10 @@ def _conditions(state: AppState, figure: Figure) -> str:
         has_map = state.project.floor_map is not None
         walls = "the floor map alone and exact, nobody about" if has_map else "there is no floor map"
         return escaped("; ".join((heading, walls, *_zones(state))))
+    if figure in BY_TAGS:
+        return escaped("; ".join((heading, "one frame of the camera", *_zones(state))))
+    if figure is Figure.REELS:
+        return "all round; those that stand there when a drive begins"
     parts = [heading, MEASUREMENT_NAMES[settings.measurement]]
     if blocked_per_m > 0.0:
         parts.append(f"people {PERCENT.number(blocked_per_m, '.1f')} %/m")
@@ -115,9 +119,9 @@ def _zones(state: AppState) -> tuple[str, ...]:
 def _limit(heat: HeatView, state: AppState) -> str:
     """Say where the supervisor's limit lies on the scale."""
     limits = state.project.parameters.supervisor
-    if heat.scale.figure in {Figure.POSITION_SIGMA, Figure.TOTAL_SIGMA, Figure.CONTOUR_POSITION}:
+    if heat.scale.figure in {Figure.POSITION_SIGMA, Figure.TOTAL_SIGMA, Figure.CONTOUR_POSITION, Figure.TAG_POSITION}:
         return _limit_text(MILLIMETRES, limits.position_limit, (".0f", ".0f"))
-    if heat.scale.figure in {Figure.HEADING_SIGMA, Figure.CONTOUR_HEADING}:
+    if heat.scale.figure in {Figure.HEADING_SIGMA, Figure.CONTOUR_HEADING, Figure.TAG_HEADING}:
         return _limit_text(DEGREES, limits.heading_limit, (".1f", ".2f"))
     return ""
 

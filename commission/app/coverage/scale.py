@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from commission.app.base.paints import Plan
 from commission.app.base.ramp import colors
-from commission.app.coverage.settings import Figure
+from commission.app.coverage.settings import COUNTED, Figure
 from commission.geometry.arrays import BoolArray, FloatArray
 from commission.planning.dilution import Measurement
 from commission.site.quantity import BARE, DEGREES, MILLIMETRES, PERCENT, Shown
@@ -105,7 +105,7 @@ class Scale:
 
 def is_fix(figure: Figure, values: ArrayLike) -> BoolArray:
     """Whether there is something to show: a fix, or for counts at least one reflector or reel."""
-    return np.asarray(values) > 0.0 if figure in {Figure.VISIBLE, Figure.REELS} else np.isfinite(values)
+    return np.asarray(values) > 0.0 if figure in COUNTED else np.isfinite(values)
 
 
 def scale_for(figure: Figure, values: FloatArray) -> Scale:

@@ -50,6 +50,8 @@ BY_CONTOURS = frozenset({Figure.CONTOUR_POSITION, Figure.CONTOUR_HEADING})
 """Figures that no reflector has a part in."""
 BY_TAGS = frozenset({Figure.TAG_POSITION, Figure.TAG_HEADING})
 """Likewise."""
+COUNTED = frozenset({Figure.VISIBLE, Figure.REELS})
+"""Whole numbers of what is in sight."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

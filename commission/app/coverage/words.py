@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from commission.app.coverage.scale import QUANTITIES, is_fix, unit_of
-from commission.app.coverage.settings import BY_CONTOURS, Figure
+from commission.app.coverage.settings import BY_CONTOURS, BY_TAGS, COUNTED, Figure
 from commission.planning.dilution import Heading, Measurement
 from commission.site.quantity import PERCENT, joined, number_text
 
@@ -26,8 +26,10 @@ MEASUREMENT_NAMES: dict[Measurement, str] = {
 
 def none_text(figure: Figure) -> str:
     """Say what there is not where a figure has no value."""
-    if figure is Figure.VISIBLE:
+    if figure in COUNTED:
         return "none visible"
+    if figure in BY_TAGS:
+        return "no tag in sight"
     return "not the whole pose" if figure in BY_CONTOURS else "no fix"
 
 
