@@ -21,7 +21,9 @@ from commission.localization.run_columns import RunSegment
 from commission.localization.search_map import anywhere
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import state_unlocated
+from commission.localization.tag_start import told_by_tags
 from commission.localization.tags import (
+    COLUMNS,
     ENTRY,
     NIS,
     NOT_ON_SITE,
@@ -309,6 +311,18 @@ def test_a_vehicle_that_is_not_told_where_it_is_is_told_by_one_tag():
     # It says so only once others agree.
     assert whole.modes[-1] == Mode.OPERATIONAL
     assert int(np.argmax(whole.modes == Mode.OPERATIONAL)) >= 5
+
+
+def test_what_a_frame_believed_by_itself_is_not_handed_out_once_a_tag_tells_another_place():
+    frame = next(each for each in mixed().records() if isinstance(each, TagSightings) and len(each.ids))
+    lost = state_unlocated(0, anywhere(STANDING.index.places))
+    elsewhere = from_belief(Belief(0, np.array((7.0, -3.0, 1.0)), 1e-4 * np.eye(3)))
+    believed = lost._replace(belief=elsewhere, output=elsewhere, output_ns=5, mode=int(Mode.OPERATIONAL))
+    figures = np.zeros((len(frame.ids), COLUMNS))
+    told = told_by_tags((lost, believed), STANDING, frame.sightings, np.array(frame.ids, dtype=np.str_), figures)
+    assert told is not None
+    assert (told.output, told.output_ns, told.mode) == (lost.output, lost.output_ns, Mode.FAIL)
+    assert math.dist((told.belief.x, told.belief.y), (7.0, -3.0)) > 1.0
 
 
 def test_a_place_told_by_a_tag_is_as_uncertain_as_many_such_places_scatter():

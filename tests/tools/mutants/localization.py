@@ -24,6 +24,23 @@ SEVERAL = TESTS + "test_several_scans.py::"
 
 LOCALIZATION = (
     Mutant(
+        name="what a frame believed by itself is handed out though a tag tells another place",
+        file=FOLDER + "tag_start.py",
+        find="output=before.output",
+        replace="output=after.output",
+        tests=(
+            TESTS + "test_tags.py::"
+            "test_what_a_frame_believed_by_itself_is_not_handed_out_once_a_tag_tells_another_place",
+        ),
+    ),
+    Mutant(
+        name="a match of contours is held by the far face of a thin wall",
+        file=FOLDER + "contour_match.py",
+        find="comes_through = read_distance(",
+        replace="comes_through = -read_distance(",
+        tests=(TESTS + "test_contour_match.py::test_the_far_face_of_a_thin_wall_holds_no_match",),
+    ),
+    Mutant(
         name="poses that go along are carried in the direction in which the run's own one drives",
         file=FOLDER + "several_scans.py",
         find="direction_of(rival.theta - before[2])",
