@@ -255,9 +255,9 @@ def beside(  # noqa: PLR0917 - a pose and the points
 
     Notes
     -----
-    pose + k e, k from -`PROBED` to `PROBED` cells, e the direction that the second derivative of the cost says least of
-    (derived). A wall has two faces: where few beams tell a direction, and a heading that was off has carried their ends
-    through a thin wall, its far face holds the pose, as sure of itself as the right one.
+    tried = pose + k e, k from -`PROBED` to `PROBED` cells, e the direction that the second derivative of the cost says
+    least of (derived). A wall has two faces: where few beams tell a direction, and a heading that was off has carried
+    their ends through a thin wall, its far face holds the pose, as sure of itself as the right one.
     """
     few = points[::PROBES]
     at = cost_of(pose, lever, few, tables, rule.length, threshold, False)
@@ -284,8 +284,8 @@ def facing_cost(pose: GridPose, points: FloatArray, tables: ContourTables, lengt
 
     Notes
     -----
-    `cost_of`, where d counts only if it does not grow over the last cell of the beam (derived): before the face that
-    stops a beam it falls; behind the middle of the wall it rises.
+    E of `cost_of`, d = infinity where d(end) > d(end - 1 cell) along the beam (derived): before the face that stops a
+    beam the distance falls, behind the middle of the wall it rises.
     """
     c, s = math.cos(pose.theta), math.sin(pose.theta)
     l2, total = length * length, 0.0
