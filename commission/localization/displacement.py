@@ -11,6 +11,8 @@ from commission.compiled import compiled_inline
 
 FEWEST_PAIRS = 2.0
 """Of one detection no heading can be told."""
+ALLOWED = 2.0
+"""Squares of the shares of what is harmless, of the position and of the heading together: an error may have both."""
 COHERENT = 9.0
 """Mean square of what is left of a degree of freedom, over the noise, up to which one displacement explains all."""
 
@@ -85,7 +87,7 @@ def tell_of_a_displacement(pairs: Pairs, harmless: float, harmless_turn: float) 
     -----
     min over d, t of sum w |e - d - t R q|^2 + |d|^2 / harmless^2 + t^2 / harmless_turn^2, R the turn by 90 degrees:
     least squares with a prior, linear in a small t, derived from its normal equations. Explained where the first part
-    is at most 9 (2 n - 3), by the noise; harmless where the others are at most 1, by definition.
+    is at most 9 (2 n - 3), by the noise; harmless where the others are at most 2, each being 1 at most, by definition.
     """
     if pairs.number < FEWEST_PAIRS or not (harmless > 0.0 and harmless_turn > 0.0):
         return False
@@ -99,4 +101,4 @@ def tell_of_a_displacement(pairs: Pairs, harmless: float, harmless_turn: float) 
     left += pairs.w * square + pairs.wqq * turn * turn + 2.0 * turn * (dy * pairs.wx - dx * pairs.wy)
     if left > COHERENT * (2.0 * pairs.number - 3.0):
         return False
-    return of_place * square + of_turn * turn * turn > 1.0
+    return of_place * square + of_turn * turn * turn > ALLOWED

@@ -29,6 +29,8 @@ FEWEST_AGAINST = 3.0
 """Rejected detections that a scan holds at least to speak against the pose: of one shiny thing there is one."""
 MOST_FOR = 0.25
 """Accepted ones for each rejected one that such a scan holds at most: chance lets one or two of eight pass."""
+NOISE = 3.0
+"""Sigma of a range that say nothing of the pose: what is rejected is beyond two of them as it is."""
 PER_MATCH = 3.0
 """Accepted detections that a match of contours which tells the whole pose counts for."""
 
@@ -72,7 +74,7 @@ class RejectionRule(NamedTuple):
     """A detection at range r is near a reflector up to reach + turn r."""
     harmless: float
     harmless_turn: float
-    """It says nothing up to harmless + harmless_turn r: an error that the supervisor allows explains it."""
+    """It says nothing where such an error of the position and of the heading explains it, see `is_harmless`."""
     near_limit: float
     limit: float
     doubtful_position: float
@@ -148,10 +150,10 @@ def weigh(  # noqa: PLR0917 - the scan's detections and the map, array by array
     detections, and as one where the pose has to prove right. One that tells a part of the pose proves nothing; it
     takes back one scan that spoke against the pose.
 
-    What an error explains that the supervisor allows does not count, unless all that is rejected near reflectors tells
-    together of one that it does not allow: `tell_of_a_displacement`.
+    What an error explains that the supervisor allows does not count (`is_harmless`), unless all that is rejected near
+    reflectors tells together of one that it does not allow: `tell_of_a_displacement`.
     """
-    accepted, rejected, near, excused, pairs = 0.0, 0.0, 0.0, 0.0, NO_PAIRS
+    accepted, rejected, near, excused, pairs, before = 0.0, 0.0, 0.0, 0.0, NO_PAIRS, NOBODY
     for i in range(first, last):
         if status[i] == INLIER:
             accepted += 1.0
@@ -162,17 +164,21 @@ def weigh(  # noqa: PLR0917 - the scan's detections and the map, array by array
             qx = offset_x + measured * math.cos(direction)
             qy = offset_y + measured * math.sin(direction)
             x, y, reach = belief.x + qx, belief.y + qy, rule.reach + rule.turn * measured
-            entry, distance = nearest(x, y, reach, cells, places, cell_offsets)
-            if distance > rule.harmless + rule.harmless_turn * measured:
+            entry, _ = nearest(x, y, reach, cells, places, cell_offsets)
+            if entry == NOBODY:
                 rejected += 1.0
-                near += 1.0 if entry != NOBODY else 0.0
-            else:
+                continue
+            ex, ey, survey = places[entry, 0] - x, places[entry, 1] - y, places[entry, 2]
+            if is_harmless(qx, qy, ex, ey, model.range_variance + survey, rule):
                 excused += 1.0
-            if entry != NOBODY:
-                variance = model.range_variance + measured * measured * model.bearing_variance + places[entry, 2]
-                pairs = with_pair(pairs, qx, qy, places[entry, 0] - x, places[entry, 1] - y, variance)
-    if excused > 0.0 and tell_of_a_displacement(pairs, rule.harmless, rule.harmless_turn):
-        rejected, near = rejected + excused, near + excused
+            else:
+                rejected, near = rejected + 1.0, near + 1.0
+            # Neighbors in a scan: of one reflector there is one detection, the others are of something else.
+            if entry != before:
+                variance = model.range_variance + measured * measured * model.bearing_variance + survey
+                pairs, before = with_pair(pairs, qx, qy, ex, ey, variance), entry
+    told = excused if excused > 0.0 and tell_of_a_displacement(pairs, rule.harmless, rule.harmless_turn) else 0.0
+    rejected, near = rejected + told, near + told
     confirmed, against = evidence.confirmed, evidence.against
     doubtful = is_doubtful(belief, rule)
     matches = contours == 1.0 and not doubtful
@@ -188,6 +194,32 @@ def weigh(  # noqa: PLR0917 - the scan's detections and the map, array by array
     if matches:
         accepted, rejected, confirmed = accepted + PER_MATCH, near, confirmed + 1.0
     return decayed(evidence, stamp_ns, accepted, rejected, near, confirmed, against, rule)
+
+
+@compiled_inline
+def is_harmless(  # noqa: PLR0917 - a detection and its reflector, number by number
+    qx: float, qy: float, ex: float, ey: float, variance: float, rule: RejectionRule
+) -> bool:
+    """Whether an error of the pose that the supervisor allows explains where a detection is.
+
+    Parameters
+    ----------
+    qx, qy : from base to the detection [m], map axes.
+    ex, ey : from the detection to the reflector [m], map axes.
+    variance : of its range and of the reflector's place, along the line of sight [m^2].
+    rule : windows and limits.
+
+    Notes
+    -----
+    e = d + t R q, |d| <= harmless, |t| <= harmless_turn, R the turn by 90 degrees: e lies within `harmless` of the
+    stretch from -harmless_turn R q to harmless_turn R q, by definition. A turn explains nothing along the line of
+    sight: there, up to 3 sigma are noise. Across it they are less than what the turn explains, and left out.
+    """
+    distance = math.sqrt(qx * qx + qy * qy)
+    to_x, to_y = (qx / distance, qy / distance) if distance > 0.0 else (1.0, 0.0)
+    along = max(abs(ex * to_x + ey * to_y) - NOISE * math.sqrt(variance), 0.0)
+    across = max(abs(to_x * ey - to_y * ex) - rule.harmless_turn * distance, 0.0)
+    return along * along + across * across <= rule.harmless * rule.harmless
 
 
 @compiled_inline

@@ -541,7 +541,7 @@ class SupervisorParameters:
         float, Quantity(label="Harmless up to", shown=PERCENT, bounds=SHARE, step=5.0, slider=(0.0, 100.0))
     ] = 0.4
     """Share of the limits of 2σ: a rejected detection that such an error explains is no sign of being lost, unless
-    several together tell of one larger error."""
+    several together tell of one larger error. A turn explains nothing along the line of sight."""
     rejection_near_limit: Annotated[
         float,
         Quantity(label="Rejected near", shown=PERCENT, bounds=Bounds.inside(0.0, 1.0), step=1.0, slider=(5.0, 95.0)),

@@ -36,11 +36,10 @@ ELSEWHERE = (("laboratory", 1), ("shop_floor", 2), ("warehouse", 3))
 PEOPLE = 50
 SLIPS = (*((degrees, 0.0) for degrees in (2, 3, 5, 8)), (0, 0.12), (0, 0.2), (0, 0.3))
 """Turn [degrees] and way ahead [m] that odometry tells and that did not happen."""
+START_OFF = 26
+"""Seed of a drive that starts 35 mm off at the laboratory, 3.5 sigma: what it rejects there is harmless."""
 LONGEST = 15
 """Cycles that a vehicle may be dangerous and operational."""
-LONGEST_NEAR_LIMIT = 30
-"""The same of a slip that passes the limit by a fifth: one detection alone is excused, and among people there is often
-but one in a scan. 3 of 45 drives took more than 15, 29 at most."""
 
 pytestmark = pytest.mark.slow
 
@@ -107,11 +106,7 @@ def unnoticed(
         if in_sight:
             said &= run.counts(Status.INLIER) + run.counts(Status.OUTLIER_ASSOCIATION) > 0
         found[people, seed, degrees, ahead] = int(np.count_nonzero(said))
-    return {
-        slip: cycles
-        for slip, cycles in found.items()
-        if cycles > (LONGEST_NEAR_LIMIT if 0.0 < slip[3] < 0.15 else LONGEST)
-    }
+    return {slip: cycles for slip, cycles in found.items() if cycles > LONGEST}
 
 
 @pytest.mark.parametrize("people", [0, PEOPLE])
@@ -124,7 +119,7 @@ def test_no_slip_is_dangerous_for_long(repository: Path, seeds: Seeds, site: str
 @pytest.mark.parametrize("site", few_of(SITES, ("laboratory", "shop_floor")))
 def test_people_alone_never_make_a_vehicle_lost(repository: Path, seeds: Seeds, site: str) -> None:
     project, alarms = hall(repository / "maps", site), {}
-    for seed in seeds(2, 50):
+    for seed in (*seeds(2, 50), START_OFF):
         run, dangerous = drive(project, PEOPLE, seed).localized()
         assert not dangerous.any()
         alarms[seed] = int(np.count_nonzero(run.modes == Mode.LOST))

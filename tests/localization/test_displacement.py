@@ -41,7 +41,7 @@ def test_it_is_least_squares_with_a_prior(seed: int) -> None:
     d, turn = rng.normal(0.0, 0.05, 2), rng.normal(0.0, 0.02)
     e = d + turn * np.column_stack((-q[:, 1], q[:, 0])) + rng.normal(0.0, rng.uniform(0.5, 4.0) * 0.02, (count, 2))
     left, square = by_numpy(q, e, variances)
-    expected = left <= COHERENT and square > 1.0
+    expected = left <= COHERENT and square > 2.0
     assert tell_of_a_displacement(pairs_of(q, e, variances), HARMLESS, HARMLESS_TURN) is expected
 
 
@@ -60,7 +60,12 @@ def turned(q: np.ndarray, angle: float) -> np.ndarray:
         (ALL_AROUND, np.tile((0.12, 0.0), (3, 1)), True),
         (ALL_AROUND, np.tile((0.03, 0.0), (3, 1)), False),
         (ALL_AROUND, turned(ALL_AROUND, math.radians(1.0)), False),
-        (ALL_AROUND, turned(ALL_AROUND, math.radians(1.6)), True),
+        (
+            ALL_AROUND,
+            np.array((0.04, 0.0)) + turned(ALL_AROUND, math.radians(1.2)),
+            False,
+        ),  # both as large as is harmless
+        (ALL_AROUND, turned(ALL_AROUND, math.radians(2.0)), True),
         (AHEAD, np.tile((0.0, 0.12), (2, 1)), False),  # a turn of 0.7 degrees
         (AHEAD, np.tile((0.12, 0.0), (2, 1)), True),
         (ALL_AROUND, np.array([(0.12, 0.0), (0.0, -0.2), (-0.2, 0.1)]), False),  # three things, each of its own

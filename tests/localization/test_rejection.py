@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from commission.geometry.angles import difference
+from commission.geometry.arrays import FloatArray
 from commission.localization.estimate import Belief, Mode, Status
 from commission.localization.localizer import Localizer
 from commission.localization.pose_gaussian import PoseGaussian
@@ -18,6 +19,7 @@ from commission.localization.rejection import (
     NO_EVIDENCE,
     Evidence,
     RejectionRule,
+    is_harmless,
     nearest,
     rejection_rule,
     rejects_the_world,
@@ -137,6 +139,35 @@ def test_where_contours_match_only_what_is_rejected_near_reflectors_counts() -> 
     assert (doubtful.accepted, doubtful.rejected, doubtful.confirmed, doubtful.against) == (0.0, 4.0, 0.0, 5.0)
 
 
+@pytest.mark.parametrize(("metres", "counts"), [(0.097, 0.0), (0.103, 1.0)])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_no_turn_excuses_what_is_off_along_the_line_of_sight(metres: float, counts: float, sign: float) -> None:
+    # 40 % of 0.1 m and three times a range's sigma of 0.02 m; across it, a turn excuses 0.15 m of the same reflector.
+    localizer = lonely(heading_limit=0.055)
+    localizer = Localizer(localizer.setup, Belief(0, np.zeros(3), 1e-12 * np.eye(3)))
+    localizer.feed(Odometry(0, np.zeros(3)))
+    see(localizer, Detections(SECOND, np.array([[5.0 + sign * metres, 0.0]])))
+    counted = localizer.state.evidence
+    assert (counted.rejected, counted.near_rejected) == (counts, counts)
+
+
+def test_what_is_harmless_is_what_some_allowed_error_of_place_and_heading_explains() -> None:
+    rng = np.random.default_rng(5)
+    rule = RULE._replace(harmless=0.04, harmless_turn=0.02)
+    ways = rng.normal(size=(20000, 2))
+    ways *= (0.04 * np.sqrt(rng.uniform(0.0, 1.0, 20000)) / np.hypot(*ways.T))[:, np.newaxis]
+    turns = np.concatenate((rng.uniform(-0.02, 0.02, 19000), np.full(500, 0.02), np.full(500, -0.02)))
+    for qx, qy in rng.uniform(-12.0, 12.0, (20, 2)).tolist():
+        explained = 0.9999 * (ways + turns[:, np.newaxis] * (-qy, qx))
+        assert all(is_harmless(qx, qy, ex, ey, 0.0, rule) for ex, ey in explained.tolist())
+        for ex, ey in rng.uniform(-0.3, 0.3, (40, 2)).tolist():
+            # Of all turns, the one that leaves least for the place.
+            tried = np.linspace(-0.02, 0.02, 4001)
+            left = np.hypot(ex + tried * qy, ey - tried * qx).min()
+            if abs(left - 0.04) > 1e-4:
+                assert is_harmless(qx, qy, ex, ey, 0.0, rule) == (left < 0.04)
+
+
 @pytest.mark.parametrize(
     ("ahead", "counted"),
     [
@@ -145,22 +176,34 @@ def test_where_contours_match_only_what_is_rejected_near_reflectors_counts() -> 
     ],
 )
 def test_several_that_tell_of_one_displacement_count_though_each_is_harmless(ahead: float, counted: float) -> None:
-    places = np.array([(9.0, 1.0), (8.0, -6.0), (-9.0, 4.0)])
+    places = np.array([(1.0, 9.0), (2.0, -8.0), (-2.0, 9.5)])
     reflectors = tuple(Reflector(id=f"R{i}", x=x, y=y) for i, (x, y) in enumerate(places.tolist()))
     setup = LocalizerSetup(reflectors=ReflectorMap(reflectors), scanners=(Scanner(),), parameters=Parameters())
     seen = places - (ahead, 0.0)
     detections = np.column_stack((np.hypot(*seen.T), np.arctan2(seen[:, 1], seen[:, 0])))
     # A turn that is harmless moves each of them as far.
     assert (0.04 + math.radians(1.2) * detections[:, 0] > ahead).all()
-    belief = PoseGaussian(0.0, 0.0, 0.0, 1e-6, 0.0, 0.0, 1e-6, 0.0, 1e-6)
-    index, rule = setup.index, rejection_rule(SupervisorParameters())
-    for rows, expected in (((0, 3), counted), ((0, 1), 0.0)):
-        status = np.full(3, int(Status.OUTLIER_ASSOCIATION), dtype=np.int8)
-        map_rows = (index.cells, index.places, index.offsets)
-        after = weigh(
-            NO_EVIDENCE, SECOND, belief, *rows, detections, setup.observations[0], *map_rows, status, 0.0, rule
-        )
+    for count, expected in ((3, counted), (1, 0.0)):
+        after = rejected(setup, detections[:count])
         assert (after.rejected, after.near_rejected) == (expected, expected)
+
+
+def test_three_things_beside_one_reflector_tell_of_no_displacement() -> None:
+    """At most one of them is the reflector; each is harmless."""
+    reflectors = ReflectorMap((Reflector(id="A", x=9.0, y=0.0),))
+    setup = LocalizerSetup(reflectors=reflectors, scanners=(Scanner(),), parameters=Parameters())
+    seen = np.array([(8.91, -0.20), (8.94, -0.20), (8.925, -0.21)])
+    after = rejected(setup, np.column_stack((np.hypot(*seen.T), np.arctan2(seen[:, 1], seen[:, 0]))))
+    assert (after.rejected, after.near_rejected) == (0.0, 0.0)
+
+
+def rejected(setup: LocalizerSetup, detections: FloatArray) -> Evidence:
+    """What a scan leaves all of whose detections are rejected, of a vehicle at the origin."""
+    status = np.full(len(detections), int(Status.OUTLIER_ASSOCIATION), dtype=np.int8)
+    belief = PoseGaussian(0.0, 0.0, 0.0, 1e-6, 0.0, 0.0, 1e-6, 0.0, 1e-6)
+    rows, index = (0, len(detections)), setup.index
+    map_rows, rule = (index.cells, index.places, index.offsets), rejection_rule(SupervisorParameters())
+    return weigh(NO_EVIDENCE, SECOND, belief, *rows, detections, setup.observations[0], *map_rows, status, 0.0, rule)
 
 
 def weighed(

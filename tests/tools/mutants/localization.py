@@ -436,11 +436,25 @@ LOCALIZATION = (
         tests=(TESTS + "test_rejection.py::test_a_scan_speaks_against_the_pose_by_what_it_rejects",),
     ),
     Mutant(
+        name="a turn that excuses along the line of sight",
+        file=FOLDER + "rejection.py",
+        find="along = max(abs(ex * to_x + ey * to_y) - NOISE",
+        replace="along = max(abs(ex * to_x + ey * to_y) - rule.harmless_turn * distance - NOISE",
+        tests=(TESTS + "test_rejection.py::test_no_turn_excuses_what_is_off_along_the_line_of_sight",),
+    ),
+    Mutant(
         name="each rejected detection is excused alone, whatever several tell together",
         file=FOLDER + "rejection.py",
-        find="rejected, near = rejected + excused, near + excused",
+        find="rejected, near = rejected + told, near + told",
         replace="rejected, near = rejected, near",
         tests=(TESTS + "test_rejection.py::test_several_that_tell_of_one_displacement_count_though_each_is_harmless",),
+    ),
+    Mutant(
+        name="several detections of one reflector tell of a displacement",
+        file=FOLDER + "rejection.py",
+        find="if entry != before:",
+        replace="if True:",
+        tests=(TESTS + "test_rejection.py::test_three_things_beside_one_reflector_tell_of_no_displacement",),
     ),
     Mutant(
         name="a displacement that turns the other way",
@@ -448,6 +462,13 @@ LOCALIZATION = (
         find="pairs.turn + w * (qx * ey - qy * ex)",
         replace="pairs.turn + w * (qy * ex - qx * ey)",
         tests=(TESTS + "test_displacement.py::test_it_is_least_squares_with_a_prior",),
+    ),
+    Mutant(
+        name="a range without noise",
+        file=FOLDER + "rejection.py",
+        find="NOISE = 3.0",
+        replace="NOISE = 2.5",
+        tests=(TESTS + "test_rejection.py::test_no_turn_excuses_what_is_off_along_the_line_of_sight",),
     ),
     Mutant(
         name="lost by one scan too many against the pose",
@@ -463,6 +484,16 @@ LOCALIZATION = (
         replace="j.mount_xb, j.mount_yb, 1.0, 0.0, j.clock_b",
         tests=(
             TESTS + "test_bearings.py::test_a_row_is_the_derivative_of_the_expected_bearing_also_by_what_is_considered",
+        ),
+    ),
+    Mutant(
+        name="bearings that were off once are never forgotten",
+        file=FOLDER + "lasting.py",
+        find="kept = math.exp(-(seconds - row[SEEN]) / rule.window_s) if",
+        replace="kept = 1.0 if",
+        tests=(
+            TESTS + "test_lasting.py::test_older_bearings_count_less_by_the_time_that_has_passed",
+            TESTS + "test_lasting.py::test_a_reflector_that_is_back_in_its_place_is_forgotten_after_some_windows",
         ),
     ),
     Mutant(
