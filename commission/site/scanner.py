@@ -147,15 +147,13 @@ class Scanner:
     """1-sigma noise of each beam's bearing."""
     detection_range_sigma: Annotated[
         float | None,
-        Quantity(
-            label="Detections' range 1σ", unit="m", shown=MILLIMETRES, bounds=POSITIVE, step=0.5, none=AS_THE_FILTER
-        ),
+        Quantity(label="Detection 1σ", unit="m", shown=MILLIMETRES, bounds=POSITIVE, step=0.5, none=AS_THE_FILTER),
     ] = None
     """1-sigma noise of the range of a reflector that this scanner detects; none: `observation.range_sigma`."""
     detection_bearing_sigma_deg: Annotated[
         float | None,
         Quantity(
-            label="Detections' bearing 1σ",
+            label="Detection 1σ",
             unit="deg",
             shown=AS_DEGREES,
             bounds=POSITIVE,

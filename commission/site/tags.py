@@ -92,11 +92,11 @@ class TagCamera:
     ] = 10.0
     """Frames per second."""
     position_sigma: Annotated[
-        float, Quantity(label="Camera place 1σ", unit="m", shown=MILLIMETRES, bounds=NOT_NEGATIVE, step=0.5)
+        float, Quantity(label="Seen place 1σ", unit="m", shown=MILLIMETRES, bounds=NOT_NEGATIVE, step=0.5)
     ] = 0.02
     """1-sigma noise of a measured tag's place, each axis."""
     heading_sigma: Annotated[
-        float, Quantity(label="Camera heading 1σ", unit="rad", shown=DEGREES, bounds=NOT_NEGATIVE, step=0.01)
+        float, Quantity(label="Seen heading 1σ", unit="rad", shown=DEGREES, bounds=NOT_NEGATIVE, step=0.01)
     ] = 0.02
     """1-sigma noise of a measured tag's heading."""
 

@@ -161,10 +161,10 @@ CAMERA = {
     "range[1]": Row(label="Tags seen to [m]", read=camera("range", 1), allowed=(0.15, 35.0), refused=(0.0, 0.1)),
     "rate": Row(label="Frames per s", read=camera("rate"), allowed=(0.1, 1000.0), refused=(0.09, 1000.5)),
     "position_sigma": Row(
-        label="Camera place 1σ [mm]", read=camera("position_sigma"), factor=MM, allowed=(0.0, 12.5), refused=(-0.1,)
+        label="Seen place 1σ [mm]", read=camera("position_sigma"), factor=MM, allowed=(0.0, 12.5), refused=(-0.1,)
     ),
     "heading_sigma": Row(
-        label="Camera heading 1σ [°]",
+        label="Seen heading 1σ [°]",
         read=camera("heading_sigma"),
         factor=DEGREES,
         allowed=(0.0, 1.25),
@@ -384,8 +384,8 @@ def test_a_number_of_a_vehicle_is_shown_taken_and_bounded_as_its_row_says(bench:
 @pytest.mark.parametrize(
     ("label", "field", "factor"),
     [
-        ("Detections' range 1σ [mm]", "detection_range_sigma", MM),
-        ("Detections' bearing 1σ [°]", "detection_bearing_sigma_deg", 1.0),
+        ("Detection 1σ [mm]", "detection_range_sigma", MM),
+        ("Detection 1σ [°]", "detection_bearing_sigma_deg", 1.0),
     ],
 )
 def test_noise_of_detections_is_typed_in_its_unit_or_that_of_the_filter(

@@ -365,8 +365,8 @@ def test_the_numbers_along_a_route_are_those_of_its_prediction(expected_route: R
     contributed = in_any_direction(errors_of(site).parts, XY)
     table = {
         "Length": (prediction.drive.metres[-1],),
-        "Largest 2σ position / limit": (1000.0 * sigma_along(route, XY).max(), 87.0),
-        "Largest 2σ heading / limit": (DEGREES * sigma_along(route, HEADING).max(), DEGREES * 0.061),
+        "Worst 2σ position / limit": (1000.0 * sigma_along(route, XY).max(), 87.0),
+        "Worst 2σ heading / limit": (DEGREES * sigma_along(route, HEADING).max(), DEGREES * 0.061),
         "Error, 2σ position": (1000.0 * error_along(site, XY).max(),),
         "Error, 2σ heading": (DEGREES * error_along(site, HEADING).max(),),
         **{

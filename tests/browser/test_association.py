@@ -15,6 +15,20 @@ from tests.app.sites import room
 from tests.browser.page import SMALL, OpenPage
 from tests.browser.serving import Served
 
+LEAST_PX = 9
+"""Height of letters that can still be read."""
+SMALL_OR_CUT = f"""() => {{
+  const picture = document.querySelector('.c-a-picture'), box = picture.getBoundingClientRect();
+  const scale = box.width / picture.viewBox.baseVal.width;
+  const view = picture.closest('.mantine-ScrollArea-viewport').getBoundingClientRect();
+  return [...picture.querySelectorAll('text')].flatMap((each) => {{
+    const its = each.getBoundingClientRect(), size = scale * parseFloat(getComputedStyle(each).fontSize);
+    return [...(size < {LEAST_PX} ? [`${{size.toFixed(1)}} px: ${{each.textContent}}`] : []),
+      ...(its.left < box.left - 1 || its.right > box.right + 1 ? [`cut: ${{each.textContent}}`] : [])];
+  }}).concat(box.bottom > view.bottom + 1 ? ['the picture is cut'] : []);
+}}"""
+"""Words of the picture that are too small to be read, or cut; and whether it is cut itself."""
+
 
 @pytest.fixture(scope="module")
 def served() -> Iterator[Served]:
@@ -60,6 +74,13 @@ def test_a_person_reads_which_reflector_is_worst_turns_to_the_next_and_back(
     assert box is not None
     assert box["y"] + box["height"] <= SMALL[1] - 190, "all of the picture is above the plots in a small window"
     assert box["width"] == pytest.approx(box["height"], abs=1.0)
+
+    for width, height in ((1024, 700), SMALL, (1600, 900)):
+        page.page.set_viewport_size({"width": width, "height": height})
+        page.page.wait_for_timeout(400)
+        assert page.page.evaluate(SMALL_OR_CUT) == [], (width, height)
+    page.page.set_viewport_size({"width": SMALL[0], "height": SMALL[1]})
+    page.page.wait_for_timeout(400)
 
     ids = detected_ids(run, "")
     following = ids[(ids.index(worst.reflector.id) + 1) % len(ids)]

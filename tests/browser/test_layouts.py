@@ -43,6 +43,8 @@ def test_a_kept_layout_is_compared_with_a_changed_one_in_numbers_and_colors_and_
     page.wait_for_text("Reflectors stand as in layout 1")
     settled(served)
     page.choose("Floor shows", "position error, 1σ [mm]")
+    chosen = page.row("Floor shows").locator("input").first
+    assert chosen.evaluate("e => e.scrollWidth <= e.clientWidth"), "its unit can be read"
     assert page.page.get_by_role("button", name="Switch to layout 1").is_disabled()
 
     # One reflector less: worse everywhere, and the page says so in words, numbers and colors.

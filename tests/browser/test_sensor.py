@@ -17,6 +17,21 @@ from tests.app.sites import room
 from tests.browser.page import OpenPage
 from tests.browser.serving import Served
 
+WORDS_IN_EACH_OTHER = """() => [...document.querySelectorAll('.c-s-plot')].flatMap((plot) => {
+  const words = [...plot.querySelectorAll('.c-s-title, .c-s-top, .c-s-y, .c-s-line b')];
+  const boxes = words.map((each) => each.getBoundingClientRect());
+  const meet = (a, b) => a.left < b.right - 1 && b.left < a.right - 1 && a.top < b.bottom - 1 && b.top < a.bottom - 1;
+  const line = plot.querySelector('.c-s-line')?.getBoundingClientRect(), at = line && line.top + line.height / 2;
+  return words.flatMap((each, i) => [
+    ...(each.scrollWidth > each.clientWidth + 1 && getComputedStyle(each).overflow !== 'visible'
+      ? [`cut: ${each.textContent}`] : []),
+    ...words.slice(i + 1).filter((_, j) => meet(boxes[i], boxes[i + 1 + j])).map(
+      (other) => `${each.textContent} on ${other.textContent}`),
+    ...(each.className === 'c-s-y' && at > boxes[i].top + 1 && at < boxes[i].bottom - 1
+      ? [`struck through: ${each.textContent}`] : []),
+  ]);
+})"""
+"""Words of the plots that are cut, lie on each other, or under the threshold's line."""
 POST = (4.0, 5.0)
 """Where something shiny stands that is no reflector of the map [m]."""
 
@@ -64,6 +79,8 @@ def test_a_person_drags_the_threshold_over_the_peaks_and_takes_it_back(served: S
     middle = line["y"] + 0.5 * line["height"]
     share = (box["y"] + box["height"] - middle) / box["height"]
     assert share**2 * top == pytest.approx(0.5, abs=0.03 * top), "heights are the roots of intensities"
+    # In the smallest window no word of the plots is cut, and none lies on another one.
+    assert page.page.evaluate(WORDS_IN_EACH_OTHER) == []
     # Up to the very top: no peak is left.
     page.page.mouse.move(box["x"] + 80.0, middle)
     page.page.mouse.down()

@@ -12,6 +12,7 @@ import pytest
 from commission.app.run.actions import Play, Seek, VirtualDrive
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
+from commission.site.tags import Tag
 from tests.app.sites import room
 from tests.browser.page import OpenPage
 from tests.browser.serving import Served
@@ -34,6 +35,12 @@ CUT_OFF = """() => {
   const play = [...strip.querySelectorAll('button')].filter((each) => names.includes(each.textContent));
   const lines = new Set(play.map((each) => Math.round(each.getBoundingClientRect().top)));
   if (play.length !== 5 || lines.size !== 1) found.push(`${play.length} buttons in ${lines.size} lines`);
+  // Letters that hang below the line, as in "Tag", are there whole.
+  for (const each of document.querySelectorAll('.mantine-Button-label, [role=tab], label, td, th, .c-note')) {
+    if (each.children.length || !shown(each) || !each.textContent.trim()) continue;
+    const hides = getComputedStyle(each).overflowY !== 'visible';
+    if (hides && each.scrollHeight > each.clientHeight + 1) say(each, 'letters are cut');
+  }
   const floor = document.querySelector('canvas[data-engine]').getBoundingClientRect();
   const tools = [...document.querySelectorAll('div:has(>.c-rail)+div button')];
   if (tools.length !== 10) found.push(`${tools.length} tools`);
@@ -61,6 +68,10 @@ LINES_OF_LABELS = """() => [...document.querySelectorAll('[data-dock-region=left
   return [each.textContent, new Set([...words.getClientRects()].map((box) => Math.round(box.top))).size];
 })"""
 """Each label of the steps, and in how many lines it stands."""
+CLOSED = """() => [...document.querySelectorAll('[data-dock-region=left] .mantine-Paper-root[data-with-border]')]
+  .filter((each) => each.offsetParent && each.innerText && !each.innerText.includes('\\n'))
+  .map((each) => each.innerText)"""
+"""Names of the folders of the step that are closed."""
 TOOL = """(name) => [...document.querySelectorAll('div:has(>.c-rail)+div button')]
   .find((each) => each.textContent === name)"""
 LIT = """() => [...document.querySelectorAll('div:has(>.c-rail)+div button')]
@@ -73,7 +84,8 @@ def wall_of(count: int) -> Project:
     project = room()
     places = [(x, y) for y in (0.2, 7.8) for x in np.linspace(0.3, 11.7, count // 2)]
     more = tuple(Reflector(id=f"W{index + 1}", x=float(x), y=y) for index, (x, y) in enumerate(places))
-    return replace(project, reflectors=ReflectorMap((*project.reflectors.reflectors, *more)))
+    tags = (Tag(id="T1", x=6.0, y=0.2),)  # with one there is a camera to enter
+    return replace(project, reflectors=ReflectorMap((*project.reflectors.reflectors, *more)), tags=tags)
 
 
 @pytest.fixture(scope="module")
@@ -118,6 +130,14 @@ def test_no_button_or_name_is_cut_off_at_any_size(served: Served, window: Callab
     outline = page.row("Outline").locator("input")
     assert len(outline.input_value().split(",")) == 4
     assert outline.evaluate("e => e.scrollWidth <= e.clientWidth")
+    # In the other steps, with everything open that they hold, each label stands in one line.
+    for tab in ("Site", "Plan"):
+        page.open_tab(tab)
+        for _ in range(3):  # a folder may hold others
+            for name in page.page.evaluate(CLOSED):
+                page.fold(name)
+        page.page.wait_for_function(f"() => ({LINES_OF_LABELS})().length > 20")
+        assert [name for name, lines in page.page.evaluate(LINES_OF_LABELS) if lines > 1] == []
     # The rail shows which tool is in use, whether a key or the rail has chosen it.
     page.page.mouse.move(600, 300)
     for choose, lit in (

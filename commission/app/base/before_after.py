@@ -43,8 +43,8 @@ def before_after(
     if before.places:
         lines += [
             ComparedLine("All routes, all places"),
-            _count("Stop if one fails", before.stopping, after.stopping),
-            _count(f"Ambiguous, of {after.places}", before.ambiguous, after.ambiguous),
+            _count("Vital reflectors", before.stopping, after.stopping),
+            _count(f"Ambiguous places, of {after.places}", before.ambiguous, after.ambiguous),
         ]
     return compared(heads, (*lines, *more))
 

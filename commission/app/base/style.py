@@ -101,7 +101,8 @@ div:has(>div>.c-top)>div:has(.c-now){{position:absolute}}
  color:#fff!important}}
 .c-s-plots{{margin-right:calc(34vw + 8px)}}
 .c-s-head{{margin-right:34vw}}
-.c-s-plot .c-s-title{{max-width:calc(100% - 52px);overflow:hidden;text-overflow:ellipsis}}
+.c-s-plot .c-s-title{{max-width:calc(100% - 66px);background:{css(BACKGROUND)};padding-left:3px;
+ overflow:hidden;text-overflow:ellipsis}}
 .c-s-beams .c-s-top{{background:{css(BACKGROUND)};z-index:1}}
 .c-s-plot [data-at]{{cursor:pointer;pointer-events:all}}
 .c-s-chosen{{stroke:{css(Worded.LACKING.dark)};stroke-width:16;stroke-linecap:round}}
@@ -133,6 +134,9 @@ div:has(>div>.c-top)>div:has(.c-now){{position:absolute}}
 [data-dock-region] .mantine-Slider-root~.mantine-NumberInput-root{{width:68px!important;margin-left:6px!important}}
 .c-reflectors :is(td,th):first-child{{position:sticky;left:-8px;z-index:1;background:{css(Surface.HEAD.dark)}}}
 .c-reflectors th:first-child{{z-index:2}}
+@media (max-height:1000px){{.c-a-picture{{max-width:206px}} .c-a-picture :is(.c-a-word,.c-a-length){{font-size:15px}}}}
+@media (max-height:800px){{.c-a-picture :is(.c-a-word,.c-a-length){{font-size:19px}}}}
+.mantine-Button-label{{text-box:normal!important}}
 .c-data{{overflow:auto;font-size:12px;margin:0 2px 0 4px;scrollbar-width:thin}}
 .c-data h4{{margin:6px 0 1px;font-size:11px;font-weight:600;opacity:.65;position:sticky;left:0}}
 .c-data :is(th,td){{text-align:left;padding:1px 6px}}

@@ -305,7 +305,7 @@ div:has(>div>.c-route)>:nth-child(1){{grid-column:span 3;padding-left:var(--c-ta
 .c-route{{font-size:12px;height:44px;display:flex;align-items:center;white-space:nowrap;overflow:hidden}}
 div:has(>:is(.c-wide,.c-live,.c-path,.c-list-line)){{display:none}}
 input:not(:focus){{text-overflow:ellipsis}}
-{LABEL}:not({SLIDER}){{width:126px!important;padding-right:4px!important}}
+{LABEL}:not({SLIDER}){{width:130px!important;padding-right:4px!important}}
 {LABEL} .mantine-Text-root{{letter-spacing:-.4px!important;font-size:12px!important}}
 {LABEL}{SLIDER} .mantine-Text-root{{letter-spacing:-.5px!important;font-size:11.5px!important}}
 .mantine-Flex-root:has(>div input[type=checkbox])>:has(>p>label){{flex:1 1 auto!important}}

@@ -200,9 +200,10 @@ def sorted_rows(rows: Iterable[TableRow], columns: Sequence[TableColumn], order:
     columns : of the same.
     order : by what they are sorted.
     """
+    rows = list(rows)
     index = next((index for index, column in enumerate(columns) if column.key == order.column), None)
     if index is None:
-        return list(rows)
+        return rows
     known = [row for row in rows if _number(row.cells[index]) is not None]
     others = [row for row in rows if _number(row.cells[index]) is None]
     known.sort(key=lambda row: _number(row.cells[index]) or 0.0, reverse=order.is_down)

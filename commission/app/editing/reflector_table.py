@@ -25,12 +25,13 @@ from commission.app.editing.data_table import (
 from commission.app.editing.editor import Editor
 from commission.app.editing.table_reducer import TableOrder, TableOrders
 from commission.site.quantity import Bounds, Quantity, counted_text
-from commission.site.reflectors import Reflector
+from commission.site.reflectors import Reflector, ReflectorMap
 
 ROWS = 40
 """Rows that are shown at once."""
 NAME = "reflectors"
 COLUMNS = tuple(columns_of(Reflector, titles={"id": "Name"}))
+BY_KEY = {column.key: column for column in COLUMNS}
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +55,8 @@ class ReflectorTable(BasePanel):
         use = TableUse(columns=COLUMNS, select=self._selecting, enter=actions.SetReflector)
         self.tables = DataTables(gui, post, NAME, {NAME: use})
         self._keys: tuple[str, ...] = ()
+        self._by_id: dict[str, Reflector] = {}
+        self._listed: tuple[object, ...] = ()
         self._drawn: tuple[object, ...] = ()
         self._selected: tuple[str, ...] = ()
 
@@ -67,27 +70,33 @@ class ReflectorTable(BasePanel):
             return
         self._drawn = (reflectors, asked)
         selected = frozenset(editor.selected)
-        rows = self._found(reflectors.reflectors, order, selected)
-        self._keys = tuple(row.key for row in rows)
-        pages = max(1, -(-len(rows) // ROWS))
+        self._list(reflectors, order)
+        pages = max(1, -(-len(self._keys) // ROWS))
         self._turn_to(editor.selected)
         first = ROWS * (min(self._page.read(), pages) - 1)
         show(self._page.widget, visible=pages > 1)
-        parts = [f"{len(rows)} of {counted_text(len(reflectors), 'reflector')}"]
+        parts = [f"{len(self._keys)} of {counted_text(len(reflectors), 'reflector')}"]
         parts += [f"page {first // ROWS + 1} of {pages}"] if pages > 1 else []
         parts += [f"{len(selected)} selected"] if len(selected) > 1 else []
         write_html(self._count, f"<div class='c-note' style='padding:2px 6px'>{', '.join(parts)}</div>")
-        shown = rows[first : first + ROWS]
+        shown = (self._by_id[key] for key in self._keys[first : first + ROWS])
+        rows = [TableRow(r.id, tuple(column.of_field(r) for column in COLUMNS), r.id in selected) for r in shown]
         self.tables.show(
-            [TableContent(name=NAME, columns=COLUMNS, rows=shown, order=order, takes_several=True)] if rows else []
+            [TableContent(name=NAME, columns=COLUMNS, rows=rows, order=order, takes_several=True)] if rows else []
         )
 
-    def _found(self, reflectors: tuple[Reflector, ...], order: TableOrder, selected: frozenset[str]) -> list[TableRow]:
-        """Rows of those that hold what is sought, in their order."""
+    def _list(self, reflectors: ReflectorMap, order: TableOrder) -> None:
+        """Sort those that hold what is sought, where anything of that has changed; only what is shown has all cells."""
         sought = self._find.value.strip().lower()
-        found = (r for r in reflectors if sought in f"{r.id} {r.layer} {r.note}".lower())
-        rows = [TableRow(r.id, tuple(column.of_field(r) for column in COLUMNS), r.id in selected) for r in found]
-        return sorted_rows(rows, COLUMNS, order if order.column else TableOrder("id"))
+        if self._listed and self._listed[0] is reflectors and self._listed[1:] == (sought, order):
+            return
+        self._listed = (reflectors, sought, order)
+        found = [r for r in reflectors.reflectors if sought in f"{r.id} {r.layer} {r.note}".lower()]
+        order = order if order.column in BY_KEY else TableOrder("id")
+        column = BY_KEY[order.column]
+        self._by_id = {r.id: r for r in found}
+        rows = sorted_rows((TableRow(r.id, (column.of_field(r),)) for r in found), (column,), order)
+        self._keys = tuple(row.key for row in rows)
 
     def _turn_to(self, selected: tuple[str, ...]) -> None:
         """Turn to the page of what was selected on the floor just now; its row is scrolled to by the page's script."""

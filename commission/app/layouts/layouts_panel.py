@@ -6,6 +6,7 @@ from typing import Any
 
 from viser import GuiApi, GuiDropdownHandle
 
+from commission.app.base import theme, viser_private
 from commission.app.base.actions import Action
 from commission.app.base.inputs import Inputs, Text, WorkBar, enable, show
 from commission.app.base.panel import BasePanel, Post, escaped, posting, write_label
@@ -45,6 +46,8 @@ class LayoutsPanel(BasePanel):
         self._switch = gui.add_button("Switch", color="gray", visible=False, hint=switch)
         self._switch.on_click(posting(post, self._switched))
         self._figure = self._inputs.choice("figure", LayoutsState(), FIGURE_NAMES)
+        # Its names hold units, which a short field would cut.
+        gui.add_html(theme.whole_line(viser_private.identifier(self._figure)))
         self._work = WorkBar(gui, post, COMPARING, SetComparison("against", 0))
         self._table = Text(gui)
         self._forget = gui.add_button("Forget", color="gray", visible=False, hint="Forget the kept layout.")

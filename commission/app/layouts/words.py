@@ -48,7 +48,7 @@ def _of_floor(before: LayoutResult, after: LayoutResult) -> tuple[ComparedLine, 
         ComparedLine("The floor"),
         line("With a fix [%]", "share_with_fix", percent=True),
         line("2σ within the limits [%]", "share_within_limits", percent=True),
-        line("Position, 1σ, median [mm]", "position_sigma_median_m", percent=False),
+        line("Median position, 1σ [mm]", "position_sigma_median_m", percent=False),
     ]
     if not math.isnan(before.ambiguous_area + after.ambiguous_area):
         areas = before.ambiguous_area, after.ambiguous_area

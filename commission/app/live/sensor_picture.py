@@ -14,7 +14,7 @@ from commission.app.base.panel import escaped
 from commission.app.live.shiny_list import SAME_M
 from commission.geometry.arrays import FloatArray
 from commission.localization.estimate import Status
-from commission.site.quantity import DEGREES, PERCENT, number_text
+from commission.site.quantity import DEGREES, PERCENT, counted_text, number_text
 from commission.studies.sensor_view import SeenCluster, SensorView
 
 SIDE = 1000.0
@@ -27,6 +27,8 @@ NICE = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 """Ends of an axis, times a power of ten: it does not breathe with every scan."""
 STEPS_DEG = (10.0, 15.0, 30.0, 45.0, 60.0, 90.0)
 MOST_STEPS = 10
+BELOW_A_NUMBER = 0.15
+"""Share of the height that a number of the scale takes, below its place: 13 of the 90 pixels of the lowest plot."""
 NAME_PERCENT = 4.0
 """Names of reflectors are at least so far from each other [% of the width]."""
 COLORS = {
@@ -58,7 +60,7 @@ def head(view: SensorView, threshold: float) -> str:
     what = (
         f"{beams} at or above {number_text(threshold, 6)}" if view.has_intensities else f"{beams} flagged by the sensor"
     )
-    clusters = f"{len(view.clusters)} cluster{'' if len(view.clusters) == 1 else 's'}"
+    clusters = counted_text(len(view.clusters), "cluster")
     return (
         f"<div class='c-s-head'><b>{escaped(view.name)}</b> {view.time:.2f} s: {what}; {clusters}"
         f"{': ' if told else ''}{', '.join(told)}</div>"
@@ -109,6 +111,7 @@ def intensity_picture(view: SensorView, threshold: float, inbox: str, marked: tu
         if view.has_intensities
         else ""
     )
+    scale = "" if flags else _scale(top, threshold if view.has_intensities else math.nan)
     words = "".join(
         f"<span class='c-s-x' style='left:{PERCENT.of((at - low) / (high - low)):.2f}%'>{at:g}°</span>"
         for at in steps(low, high)
@@ -116,7 +119,7 @@ def intensity_picture(view: SensorView, threshold: float, inbox: str, marked: tu
     return (
         f"<div class='c-s-plot c-s-intensity' data-top='{top:.6g}' data-inbox='{inbox}'>"
         f"<svg viewBox='0 0 {SIDE:g} {SIDE:g}' preserveAspectRatio='none'>{grid}{curve}{far}{marks}</svg>"
-        f"{_names(view, low, high)}{words}{'' if flags else _scale(top)}{handle}"
+        f"{_names(view, low, high)}{words}{scale}{handle}"
         f"{_title(view) if chosen is None else _chosen_title(chosen)}</div>"
     )
 
@@ -138,9 +141,10 @@ def height(values: FloatArray, top: float) -> FloatArray:
     return np.sqrt(np.clip(values / top, 0.0, 1.0))
 
 
-def _scale(top: float) -> str:
-    """The numbers at the upper edge, at half and at a quarter of the height."""
-    shares = (1.0, 0.5, 0.25)
+def _scale(top: float, threshold: float) -> str:
+    """The numbers at the upper edge, at half and at a quarter of the height, but none under the threshold's line."""
+    line = float(height(np.array(threshold), top))
+    shares = [share for share in (1.0, 0.5, 0.25) if not share - BELOW_A_NUMBER < line < share]
     return "".join(
         f"<span class='c-s-y' style='top:{PERCENT.of(1.0 - share):g}%'>{number_text(top * share * share)}</span>"
         for share in shares
@@ -211,7 +215,7 @@ def told(each: SeenCluster) -> str:
     who = f", {each.reflector}" if each.reflector else ""
     peak = "" if math.isnan(each.peak) else f", peak {number_text(each.peak, 4)}"
     where = f"{DEGREES.text(each.bearing, '.1f')}, {each.range:.2f} m"
-    return f"{where}, {each.beams} beam{'' if each.beams == 1 else 's'}{window}{peak}: {WORDS[each.status]}{who}"
+    return f"{where}, {counted_text(each.beams, 'beam')}{window}{peak}: {WORDS[each.status]}{who}"
 
 
 def _names(view: SensorView, low: float, high: float) -> str:
@@ -268,5 +272,6 @@ def beams_picture(view: SensorView, inbox: str = "", marked: tuple[float, float]
         f"<svg viewBox='0 0 {SIDE:g} {SIDE:g}' preserveAspectRatio='none'>"
         f"{band}{dots}{now}</svg><span class='c-s-top'>{most:g} beams</span><span class='c-s-x' style='left:50%'>"
         f"{0.5 * reach:g} m</span><span class='c-s-x c-s-end'>{reach:g} m</span>"
-        "<span class='c-s-title'>beams over range; band: passes</span></div>"
+        "<span class='c-s-title' title='Beams of each cluster over its range; those within the band pass'>"
+        "band: passes</span></div>"
     )

@@ -67,9 +67,7 @@ def list_text(found: ShinyView | None, marked: tuple[float, float] | None, *, is
 def _none_yet(found: ShinyView | None, *, is_live: bool) -> str:
     """Say why there is no list."""
     if is_live:
-        return (
-            "As bright as a reflector and none of the map. A vehicle drives now: the list is of what has come so far."
-        )
+        return "A vehicle drives now. Look now lists what was as bright as a reflector so far and is none of the map."
     if found is None:
         return "Listed when a drive is there."
     return "Looking for them …" if found.outdated else "The search failed; another run starts it again."

@@ -127,8 +127,8 @@ def _numbers(route: RouteView) -> list[tuple[str, str]]:
     largest, error = metres.two_sigma[:, 2].max(), route.errors.max(axis=0)
     rows = [
         ("Length", f"{prediction.drive.length:.1f} m"),
-        ("Largest 2σ position / limit", MILLIMETRES.against(metres.position.max(), limits.position_limit)),
-        ("Largest 2σ heading / limit", DEGREES.against(largest, limits.heading_limit, (".2f", ".1f"))),
+        ("Worst 2σ position / limit", MILLIMETRES.against(metres.position.max(), limits.position_limit)),
+        ("Worst 2σ heading / limit", DEGREES.against(largest, limits.heading_limit, (".2f", ".1f"))),
         ("Error, 2σ position", MILLIMETRES.text(error[0], ".1f")),
         ("Error, 2σ heading", DEGREES.text(error[1], ".2f")),
         *_budget(route),

@@ -81,7 +81,8 @@ class RoutePanel(BasePanel):
         self._show_risks(() if route is None else route.risks)
         self._neighbors.write((route,), lambda: "" if route is None else _risk_text(route))
         if route is None:
-            self._chart.write((None,), str)
+            is_asked = bool(view.state.part(PredictionSettings).route)
+            self._chart.write(("", is_asked, len(names)), lambda: "" if is_asked else _asks(len(names) > 1))
             return
         cycles = 0 if lived is None else len(lived.poses) // CYCLES_PER_CHART
         self._chart.write(
@@ -103,6 +104,13 @@ class RoutePanel(BasePanel):
                 for risk in risks[:MOST_RISKS]
             ]
         )
+
+
+def _asks(has_routes: bool) -> str:
+    """Say what comes of choosing a route, or what there is to be done first."""
+    text = "the error to be expected along it, what the filter will say of it, and where the supervisor would stop."
+    said = f"Choose a route: {text}" if has_routes else f"Draw a route first. Then it tells {text}"
+    return f"<div class='c-note' style='padding:2px 6px'>{said}</div>"
 
 
 def _risk_text(route: RouteView) -> str:

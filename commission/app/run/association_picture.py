@@ -31,6 +31,8 @@ FEWEST_PX = 7.0
 """The same of its finer lines."""
 ARM_PX = 6.0
 """Half of the cross of a detection."""
+WORDS_PX = 96.0
+"""Room that a length beside a cross takes where the picture is small and its words are large in it."""
 RIVALS_TOLD = 3
 CLOUD_COLOR = theme.css(theme.CLOUD)
 VERDICTS = {
@@ -199,11 +201,11 @@ def _innovation(frame: Frame, detection: JudgedDetection) -> str:
     color, (x, y) = theme.css(COLORS[detection.status]), frame.at(detection.offset)
     after = frame.at(detection.corrected)
     middle = 0.5 * SIDE
-    # Beside the cross, on the side away from the reflector.
-    is_right = x >= middle
+    # Beside the cross, on the side away from the reflector, and where that has no room for it on the other one.
+    is_right = middle <= x <= SIDE - WORDS_PX or x < WORDS_PX
     words = (
         f"<text class='c-a-length' x='{x + (9 if is_right else -9):.1f}' y='{y + (14 if y >= middle else -8):.1f}' "
-        f"text-anchor='{'start' if is_right and x < 0.8 * SIDE else 'end'}'>"
+        f"text-anchor='{'start' if is_right else 'end'}'>"
         f"{MILLIMETRES.text(detection.length, '.1f')}</text>"
     )
     return (
@@ -220,7 +222,7 @@ def _scale_bar(frame: Frame) -> str:
     length, y = main * frame.pixels, SIDE - 9.0
     return (
         f"<path class='c-a-bar' d='M8 {y - 4:g}V{y:g}H{8 + length:.2f}V{y - 4:.2f}'/>"
-        f"<text class='c-a-word' x='{14 + length:.1f}' y='{y:g}'>{_short(main)}, grid {_short(fine)}</text>"
+        f"<text class='c-a-word' x='8' y='{y - 8.0:g}'>{_short(main)}, grid {_short(fine)}</text>"
     )
 
 

@@ -39,8 +39,8 @@ def test_every_figure_of_both_layouts_stands_in_its_column_with_its_unit() -> No
         ["All there [mm]", "4.0", "<i class='c-worse'>6.0</i>"],
         ["Any one failing [mm]", "6.0", "<i class='c-worse'>9.0</i>"],
         ["All routes, all places"],
-        ["Stop if one fails", "4", "<i class='c-better'>3</i>"],
-        ["Ambiguous, of 2", "1", "1"],
+        ["Vital reflectors", "4", "<i class='c-better'>3</i>"],
+        ["Ambiguous places, of 2", "1", "1"],
     ]
 
 

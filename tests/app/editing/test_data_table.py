@@ -131,6 +131,26 @@ def test_a_range_goes_over_the_pages_of_the_table_in_its_order(server: viser.Vis
     assert [row.key for row in table.tables.shown[0].rows if row.is_selected] == ["W5"]
 
 
+def test_of_thousands_of_reflectors_only_those_that_are_shown_are_written(
+    server: viser.ViserServer, state: AppState, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    many = tuple(Reflector(id=f"W{index}", x=float(index), y=0.0) for index in range(5_000))
+    state = replace(state, project=replace(state.project, reflectors=ReflectorMap(many)))
+    table, written, plain = ReflectorTable(server.gui, lambda _action: None, ME), [0], TableColumn.of_field
+
+    def counting(column: TableColumn, value: object) -> str:
+        written[0] += 1
+        return plain(column, value)
+
+    monkeypatch.setattr(TableColumn, "of_field", counting)
+    table.draw_slowly(PageView(state=state))
+    assert written[0] <= len(many) + ROWS * len(BY_KEY)
+    written[0] = 0
+    table.draw_slowly(PageView(state=after(state, actions.SelectReflectors(("W7",)))))
+    assert [row.key for row in table.tables.shown[0].rows if row.is_selected] == ["W7"]
+    assert written[0] <= ROWS * len(BY_KEY)
+
+
 def test_what_no_script_of_the_page_says_is_refused(server: viser.ViserServer) -> None:
     table = ReflectorTable(server.gui, lambda _action: None, ME)
     for text in (
