@@ -59,3 +59,13 @@ def test_what_is_no_table_is_said_with_its_line(tmp_path: Path, data: bytes, mes
     with pytest.raises(FileFormatError) as caught:
         content(path, 100_000)
     assert message in str(caught.value)
+
+
+@pytest.mark.parametrize("blank", [" ", "\t", "\x1c", "\x1f", "\x85", "\u2003"])
+def test_what_is_blank_around_a_stamp_is_passed_over(tmp_path: Path, blank: str) -> None:
+    file = tmp_path / "table.csv"
+    file.write_bytes(f"stamp_ns,x\n5,1\n{blank}7{blank},2\n".encode())
+
+    (block,) = read_table(file, ("stamp_ns", "x"))
+
+    assert block.stamps().tolist() == [5, 7]

@@ -87,10 +87,12 @@ def fuzz(count: int, seed: int) -> Counter[str]:
                 check(load_log(path.parent if path == files[name] else path))
                 told[f"{name}: read"] += 1
             except CommissionError as error:
-                assert "\n" not in str(error), data.hex()
+                assert "\n" not in str(error), str(error)
                 told[f"{name}: refused"] += 1
             except Exception:
-                sys.stderr.write(f"{name}: {data.hex()}\n")
+                kept = Path(tempfile.gettempdir()) / f"fuzzed_{seed}_{index}{files[name].suffix}"
+                kept.write_bytes(data)
+                sys.stderr.write(f"{name}: kept as {kept}\n")
                 raise
             finally:
                 if path == files[name]:

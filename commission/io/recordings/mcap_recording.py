@@ -6,11 +6,14 @@ Scans stay in the file. Any other MCAP is a bag (`ros_source`), and so is this o
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from commission.errors import FileFormatError
+from commission.geometry.arrays import Scalar
 from commission.io.recordings import motion
 from commission.io.recordings.mcap_columns import (
     ExactBeams,
@@ -189,16 +192,23 @@ class McapRecording(WholeRecording):
         )
         store = McapScans(
             index=index,
-            places=places.chosen(rows),
+            places=replace(places.chosen(rows), limits=_once(places.limits[rows])),
             stamps_ns=stamps[rows],
-            angle_min=angles[rows, 0],
-            angle_increment=angles[rows, 1],
-            beams=beams[rows],
+            angle_min=_once(angles[rows, 0]),
+            angle_increment=_once(angles[rows, 1]),
+            beams=_once(beams[rows]),
             most=int(beams.max()),
             scanner=scanner,
+            clean=self._check_ranges,
         )
         is_small = len(store) * store.most * 9 <= IN_MEMORY
         return store.block(0, len(store)) if is_small else store, _told("scans", late, repeated, "left out")
+
+    def _check_ranges(self, ranges: np.ndarray, _intensities: np.ndarray | None, _limits: np.ndarray) -> None:
+        """Raise FileFormatError where a range of scans that are read cannot be."""
+        if (ranges < 0.0).any():
+            found = f"has a range of {np.nanmin(ranges):g} m"
+            raise FileFormatError(self.path, "scans", found, "0 m or more, as it was recorded")
 
     def _detections(self, found: list[PairColumns]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Stamps, scanners, offsets and pairs of what the scanners themselves detected, in order of their stamps."""
@@ -234,6 +244,12 @@ class McapRecording(WholeRecording):
         """Raise FileFormatError where a number is not finite."""
         if not np.isfinite(values).all():
             raise FileFormatError(self.path, name, "has a number that is not finite", "a file as it was recorded")
+
+
+def _once(values: NDArray[Scalar]) -> NDArray[Scalar]:
+    """(K, ...) the same values, in the memory of one row where all are one: of hours, each column is 4 MB and more."""
+    is_one = len(values) > 1 and bool((values == values[0]).all())
+    return np.broadcast_to(values[:1].copy(), values.shape) if is_one else values
 
 
 def _told(name: str, late: int, repeated: int, fate: str) -> list[str]:

@@ -14,6 +14,7 @@ from typing import IO
 
 from commission.errors import FileFormatError
 from commission.io.reading import cannot_read
+from commission.site.quantity import STAMP_LIMIT
 
 PCAP_MAGICS = {
     b"\xd4\xc3\xb2\xa1": ("<", 1_000),
@@ -95,6 +96,9 @@ def payloads(path: Path, told: Counter[str] | None = None, senders: Collection[s
     hosts = None if senders is None else {sender.rpartition(":")[0] for sender in senders}
     fragments, streams = _Fragments(told, hosts), _Streams(told)
     for captured, link, packet in packets(path, told):
+        if abs(captured) >= STAMP_LIMIT:
+            told["packets of the capture have a time that cannot be, and are left out"] += 1
+            continue
         found = fragments.datagram(captured, _network(link, packet, told))
         if found is None:
             continue

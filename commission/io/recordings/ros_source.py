@@ -177,6 +177,8 @@ class RosbagsSource:
         with _told(path), self._reader() as reader:
             found: dict[str, tuple[str, int]] = {}
             for connection in reader.connections:
+                if not (isinstance(connection.topic, str) and isinstance(connection.msgtype, str)):
+                    raise ValueError(f"a topic is named {connection.topic!r}, of the type {connection.msgtype!r}")
                 count = found.get(connection.topic, ("", 0))[1] + connection.msgcount
                 found[connection.topic] = connection.msgtype, count
         self.topics = tuple(BagTopic(name, kind, count) for name, (kind, count) in found.items())

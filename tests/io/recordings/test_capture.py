@@ -243,3 +243,15 @@ def test_packets_of_virtual_networks_are_read(tmp_path: Path, tags: int) -> None
     found = list(payloads(made.write_pcap(tmp_path / "a.pcap", [(START, tagged)])))
 
     assert [payload.data for payload in found] == [b"hello"]
+
+
+def test_packet_whose_time_cannot_be_is_left_out_and_told(tmp_path: Path) -> None:
+    packets = [(START + i, made.ip(17, made.udp(part))) for i, part in enumerate(fragments(instance(60), 1))]
+    content = made.write_pcapng(tmp_path / "a.pcapng", packets, digits=9).read_bytes()
+    # Its unit is a second, by one byte that is another one: the stamps are 1.7e27 ns.
+    unit = struct.pack("<HHB", 9, 1, 9)
+    assert content.count(unit) == 1
+    (tmp_path / "a.pcapng").write_bytes(content.replace(unit, struct.pack("<HHB", 9, 1, 0)))
+
+    with pytest.raises(FileFormatError, match="packets of the capture have a time that cannot be, and are left out"):
+        load_log(tmp_path / "a.pcapng")

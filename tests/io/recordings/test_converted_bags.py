@@ -166,3 +166,16 @@ def test_formats_that_are_only_read_are_refused_as_targets(tmp_path: Path, capsy
     told = capsys.readouterr().err
     assert f"ends in {ending}, which is read only; expected a folder for tables" in told
     assert ".mcap or .db3 (ROS 2) or .bag (ROS 1)" in told
+
+
+def test_range_below_zero_is_told(tmp_path: Path) -> None:
+    scan = next(record for record in steps() if isinstance(record, Scan))
+    odd = np.float32(7.654321)
+    records = [Odometry(scan.stamp_ns, np.zeros(3)), replace(scan, ranges=np.full(len(scan.ranges), odd), scanner=0)]
+    file = tmp_path / "drive.db3"
+    write_records(file, records)
+    # What one bit makes of a file without checksums.
+    file.write_bytes(file.read_bytes().replace(odd.tobytes(), (-odd).tobytes(), 1))
+
+    with pytest.raises(FileFormatError, match=r"scans: has a range of -7.65432 m; expected 0 m or more"):
+        load_log(file)

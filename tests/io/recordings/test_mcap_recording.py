@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import tracemalloc
 from collections.abc import Iterable
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -204,6 +204,22 @@ def test_scans_of_a_large_file_stay_in_it(tmp_path: Path, monkeypatch: pytest.Mo
     block = log.scans[1].chosen(np.array([20, 3]))
     assert_same([block.scan(0), block.scan(1)], [expected[20], expected[3]])
     assert len(log.scans[1].block(5, 5)) == 0
+
+
+def test_what_all_scans_have_alike_takes_the_memory_of_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mcap_recording, "IN_MEMORY", 0)
+    alike = [
+        Scan(stamp_ns=step, ranges=np.ones(5, np.float32), angle_min=-1.0, angle_increment=0.5) for step in range(9)
+    ]
+    write_mcap(tmp_path / "alike.mcap", alike)
+    write_mcap(tmp_path / "two.mcap", [*alike[:8], replace(alike[8], angle_min=-1.5)])
+
+    (store,), (other,) = (load_log(tmp_path / name).scans for name in ("alike.mcap", "two.mcap"))
+
+    for values in (store.angle_min, store.angle_increment, store.beams):
+        assert values.strides == (0,)
+    assert [store.scan(step).angle_min for step in (0, 8)] == [-1.0, -1.0]
+    assert [other.scan(step).angle_min for step in (0, 8)] == [-1.0, -1.5]
 
 
 def test_topics_of_an_own_recording_can_be_named(tmp_path: Path) -> None:

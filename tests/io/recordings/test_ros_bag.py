@@ -396,6 +396,17 @@ def test_a_frame_whose_plane_does_not_lie_level_is_told(tmp_path: Path) -> None:
     assert any("its plane leaning by 90 deg" in note for note in read(tmp_path, [leaning, *drive()]).notes)
 
 
+def test_topic_of_sqlite_without_a_name_is_told(tmp_path: Path) -> None:
+    file = next(written(tmp_path, ".db3", drive()).glob("*.db3"))
+    connection = apsw.Connection(str(file))
+    connection.execute("ALTER TABLE topics RENAME COLUMN name TO old")
+    connection.execute("ALTER TABLE topics ADD COLUMN name")
+    connection.close()
+
+    with pytest.raises(FileFormatError, match="a topic is named None"):
+        load_log(file)
+
+
 @pytest.mark.parametrize("make", ["others", "own"])
 @pytest.mark.parametrize("column", ["timestamp", "data"])
 def test_cell_of_sqlite_that_holds_nothing_is_told(tmp_path: Path, make: str, column: str) -> None:
