@@ -45,6 +45,10 @@ from commission.localization.temporary import TemporaryModel, observe_temporary
 from commission.localization.temporary_memory import TemporaryMemory
 from commission.localization.zones import ZoneRows, kinds_at
 
+LOST_DRIFT, LOST_TURN = 0.15, 0.08
+"""By how much a lost vehicle is taken to be farther off after a second [m], [rad]: a few times what is driven blindly
+by the worst wheels that were tried, so that contours find it within seconds, and too little to reach the next room."""
+
 
 class Cycle(NamedTuple):
     """State after a scan, and the belief just before its detections were used."""
@@ -196,7 +200,7 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     posterior = with_mix(rivals, posterior, mix)
     if here.contours:
         posterior = with_contours(
-            posterior, contours, scan, state, motion, following, len(places), model, cross, busy, figures
+            posterior, contours, scan, state, stamp_ns, motion, following, len(places), model, cross, busy, figures
         )
     posterior = with_temporary(
         prior, posterior, temporary, memory, scan, state, motion, following, stamp_ns, model, cross, busy, goods
@@ -338,11 +342,41 @@ def with_mode(before: FilterState, after: FilterState, mode: int) -> FilterState
 
 
 @compiled_inline
+def spread_where_lost(belief: PoseGaussian, seconds: float) -> PoseGaussian:
+    """Belief of a vehicle that is lost, as wide as it has to be for contours to find it back.
+
+    Parameters
+    ----------
+    belief : at the stamp of a scan.
+    seconds : since the cycle before [s].
+
+    Notes
+    -----
+    P = P + diag(`LOST_DRIFT`^2, `LOST_DRIFT`^2, `LOST_TURN`^2) dt (derived): contours have rejected the pose, so
+    either the odometry is not what its noise says, or the vehicle was carried away. Where the belief stays as narrow as
+    it was, the gate never opens again, and a match is looked for nowhere else.
+    """
+    place, turned = LOST_DRIFT**2 * seconds, LOST_TURN**2 * seconds
+    return PoseGaussian(
+        belief.x,
+        belief.y,
+        belief.theta,
+        belief.xx + place,
+        belief.xy,
+        belief.xt,
+        belief.yy + place,
+        belief.yt,
+        belief.tt + turned,
+    )
+
+
+@compiled_inline
 def with_contours(  # noqa: PLR0917 - the filter's state around one scan
     belief: PoseGaussian,
     contours: ContourModel | None,
     scan: ContourScan | None,
     before: FilterState,
+    stamp_ns: int,
     motion: Motion,
     following: NextOdometry,
     reflectors: int,
@@ -358,6 +392,7 @@ def with_contours(  # noqa: PLR0917 - the filter's state around one scan
     belief : after the reflectors of the scan.
     contours, scan, figures : as in `process_scan`.
     before : state before the scan.
+    stamp_ns : of the scan [ns].
     motion, following : odometry before the scan and after it.
     reflectors : N of the reflector map.
     model : of the whole filter.
@@ -365,10 +400,12 @@ def with_contours(  # noqa: PLR0917 - the filter's state around one scan
 
     Notes
     -----
-    No formula: `observe_contours`.
+    No formula: `observe_contours`, and before it `spread_where_lost`.
     """
     if contours is None or scan is None or figures is None:
         return belief
+    if before.mode == LOST:
+        belief = spread_where_lost(belief, 1e-9 * (stamp_ns - before.evidence.stamp_ns))
     dx, dy = belief.x - before.pivot[0], belief.y - before.pivot[1]
     moved = math.sqrt(dx * dx + dy * dy)
     return observe_contours(

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 
 import numpy as np
@@ -16,7 +17,7 @@ from commission.geometry.raycast import RayCaster
 from commission.io.map_server import read_floor_map
 from commission.io.project_file import load_project
 from commission.localization.contour import ACCEPTED, MATCHED, POINTS, ROWS, USE
-from commission.localization.estimate import Belief, Estimate
+from commission.localization.estimate import Belief, Estimate, Mode
 from commission.localization.localizer import Localizer
 from commission.localization.setup import LocalizerSetup
 from commission.localization.whole_run import run
@@ -27,6 +28,7 @@ from commission.site.records import Odometry, Scan
 from commission.site.reflectors import ReflectorMap
 from commission.site.scanner import Scanner
 from commission.studies.metrics import pose_errors, reference_at
+from tests.acceptance.office import drive
 from tests.conftest import REPOSITORY
 
 NAV = Scanner(field_of_view_deg=(-180.0, 180.0), resolution_deg=0.25, range=(0.05, 40.0))
@@ -178,6 +180,22 @@ def test_starts_half_a_metre_and_15_degrees_off_converge(floor, seeds):
     print(f"{converged} of {told} converged")  # noqa: T201 - figures of the README
     assert told >= 0.7 * count
     assert converged >= math.floor(0.99 * told)
+
+
+def test_a_robot_with_poor_wheels_in_an_office_that_others_mapped_is_not_lost_for_long(shared_data, seeds):
+    """Never operational and 0.5 m off; 10 scans are two seconds."""
+    floor = read_floor_map(shared_data / "maps" / "utexas_gdc_3" / "3.yaml")
+    lost, cycles, worst = 0, 0, 0.0
+    for seed in seeds(4, 40):
+        office = drive(floor, seed)
+        columns = office.localized()
+        off = np.hypot(*(columns.means - office.poses)[:, :2].T)
+        operational, is_lost = columns.modes == Mode.OPERATIONAL, columns.modes == Mode.LOST
+        assert max(len(list(group)) if key else 0 for key, group in itertools.groupby(is_lost)) <= 10
+        lost, cycles, worst = lost + is_lost.sum(), cycles + len(off), max(worst, off[operational].max())
+    print(f"lost in {lost} of {cycles} cycles; operational and {worst:.2f} m off at most")  # noqa: T201 - README
+    assert worst < 0.5
+    assert lost <= 0.005 * cycles
 
 
 @pytest.mark.with_all_seeds

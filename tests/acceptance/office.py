@@ -1,0 +1,150 @@
+"""An office as a robot of others drives through it: their coarse map, poor wheels, half a view, people."""
+
+# pyright: basic
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components, dijkstra
+
+from commission.geometry import se2
+from commission.geometry.angles import wrap
+from commission.geometry.raycast import RayCaster
+from commission.localization.estimate import Belief
+from commission.localization.growing_run import GrowingRun
+from commission.localization.run_columns import RunColumns
+from commission.localization.setup import LocalizerSetup
+from commission.site.floor_map import FREE, OCCUPIED, FloorMap
+from commission.site.parameters import ContourParameters, Parameters
+from commission.site.records import Odometry, Record, Scan
+from commission.site.reflectors import ReflectorMap
+from commission.site.scanner import Scanner
+
+LASER = Scanner(field_of_view_deg=(-90.0, 90.0), resolution_deg=1.0, range=(0.1, 30.0), rate=5.0)
+"""181 beams, five scans a second, as in the logs of the first years of such robots."""
+CELL = 0.1
+"""Of the map that they made [m]."""
+SPEED, BEAM_SIGMA, TURN = 0.5, 0.02, 0.2
+"""Of the robot [m/s]; of a range [m]; angle between two scans where it turns on the spot [rad]."""
+SCALE_SIGMA, FORWARD, LATERAL, HEADING, TURNING = 0.03, 0.02, 0.005, 0.02, 0.05
+"""Its wheels: scale of way and of turns; along and across [m/√m], heading per way [rad/√m] and per turn [rad/√rad]. The
+filter takes the noise of headings for a third and a fifth of that, and knows of no scale."""
+
+
+@dataclass(frozen=True, eq=False)
+class Office:
+    """One drive."""
+
+    floor: FloorMap
+    records: list[Record]
+    poses: np.ndarray
+    """(K, 3) where the robot was at each scan."""
+
+    def localized(self) -> RunColumns:
+        """By contours alone, with default parameters."""
+        parameters = Parameters(contour=ContourParameters(enabled=True))
+        setup = LocalizerSetup(reflectors=ReflectorMap(), scanners=(LASER,), parameters=parameters, floor=self.floor)
+        run = GrowingRun(setup, Belief(0, self.poses[0], np.diag(np.square((0.1, 0.1, 0.05)))))
+        for record in self.records:
+            run.feed(record)
+        run.flush()
+        return run.columns()
+
+
+def way_through(floor: FloorMap, metres: float, rng: np.random.Generator) -> np.ndarray:
+    """(N, 2) points 2 cm apart from one random place to the next by the shortest way, half a metre from anything."""
+    every = round(0.2 / floor.resolution)
+    open_floor = ((floor.cells == FREE) & (floor.occupancy().distance_field() > 0.5))[::every, ::every]
+    rows, columns = open_floor.shape
+    number = np.arange(rows * columns).reshape(rows, columns)
+    edges = []
+    for down, right in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        begin = np.s_[: rows - down, max(0, -right) : columns - max(0, right)]
+        end = np.s_[down:, max(0, right) : columns + min(0, right)]
+        both = open_floor[begin] & open_floor[end]
+        edges.append((number[begin][both], number[end][both], np.full(both.sum(), math.hypot(down, right))))
+    first, last, length = (np.concatenate(each) for each in zip(*edges, strict=True))
+    graph = coo_matrix((length, (first, last)), shape=(rows * columns,) * 2).tocsr()
+    labels = connected_components(graph, directed=False)[1]
+    largest = np.bincount(labels[open_floor.ravel()]).argmax()
+    nodes = np.flatnonzero((labels == largest) & open_floor.ravel())
+    here, driven, parts = rng.choice(nodes), 0.0, []
+    while driven < metres:
+        goal = rng.choice(nodes)
+        _, before = dijkstra(graph, directed=False, indices=here, return_predecessors=True)
+        steps = [goal]
+        while steps[-1] != here:
+            steps.append(before[steps[-1]])
+        row, column = np.divmod(np.array(steps[::-1]), columns)
+        parts.append((np.column_stack((column, row)) + 0.5) * every * floor.resolution)
+        driven += np.hypot(*np.diff(parts[-1], axis=0).T).sum()
+        here = goal
+    corners = np.concatenate(parts)
+    corners = corners[np.insert(np.hypot(*np.diff(corners, axis=0).T) > 0.0, 0, True)]
+    along = np.insert(np.cumsum(np.hypot(*np.diff(corners, axis=0).T)), 0, 0.0)
+    at = np.arange(0.0, along[-1], 0.02)
+    smooth = [gaussian_filter1d(np.interp(at, along, axis), 15, mode="nearest") for axis in corners.T]
+    return se2.transform_points(floor.origin, np.column_stack(smooth))
+
+
+def poses_along(points: np.ndarray) -> np.ndarray:
+    """(K, 3) poses at each scan; on the spot where the way turns by more."""
+    ahead = points[:: round(SPEED / LASER.rate / 0.02)]
+    headings = np.arctan2(*np.gradient(ahead, axis=0).T[::-1])
+    poses = [np.array((*ahead[0], headings[0]))]
+    for place, heading in zip(ahead[1:], headings[1:], strict=True):
+        turn = wrap(heading - poses[-1][2])
+        count = int(abs(turn) // TURN)
+        poses += [poses[-1] + (0.0, 0.0, turn / (count + 1)) for _ in range(count)]
+        poses.append(np.array((*place, heading)))
+    return np.array(poses)
+
+
+def map_of_others(floor: FloorMap, rng: np.random.Generator) -> FloorMap:
+    """The hall as they have mapped it: coarse, a tenth of the walls' cells missing, some of them one cell off."""
+    every = round(CELL / floor.resolution)
+    rows, columns = (size // every for size in floor.cells.shape)
+    blocks = floor.cells[: rows * every, : columns * every].reshape(rows, every, columns, every)
+    walls, free = (blocks == OCCUPIED).any(axis=(1, 3)), (blocks == FREE).any(axis=(1, 3))
+    cells = np.where(walls, OCCUPIED, np.where(free, FREE, blocks[:, 0, :, 0])).astype(floor.cells.dtype)
+    cells[walls & (rng.random(walls.shape) < 0.1)] = FREE
+    aside = np.roll(walls, rng.integers(-1, 2), axis=rng.integers(0, 2))
+    cells[aside & (rng.random(walls.shape) < 0.15)] = OCCUPIED
+    return FloorMap(cells, CELL, floor.origin)
+
+
+def drive(floor: FloorMap, seed: int, metres: float = 60.0) -> Office:
+    """Drive through a floor, beams met by people here and there."""
+    rng = np.random.default_rng(seed)
+    poses = poses_along(way_through(floor, metres, rng))
+    others, caster = map_of_others(floor, rng), RayCaster(floor.occupancy())
+    bearings = LASER.angle_min + LASER.angle_increment * np.arange(LASER.beam_count)
+    scales = 1.0 + SCALE_SIGMA * rng.standard_normal(2)
+    records: list[Record] = []
+    for number, pose in enumerate(poses):
+        stamp_ns = round(number * 1e9 / LASER.rate)
+        moved = se2.relative(poses[max(number - 1, 0)], pose)
+        way, turn = math.hypot(*moved[:2]), abs(moved[2])
+        turned = math.sqrt(HEADING**2 * way + TURNING**2 * turn)
+        noise = (FORWARD * math.sqrt(way), LATERAL * math.sqrt(way), turned)
+        records.append(Odometry(stamp_ns, moved * scales[[0, 0, 1]] + noise * rng.standard_normal(3)))
+        rays = np.column_stack((np.full(len(bearings), pose[0]), np.full(len(bearings), pose[1]), pose[2] + bearings))
+        ranges = caster.cast(rays, LASER.range[1]) + BEAM_SIGMA * rng.standard_normal(len(bearings))
+        for first in np.flatnonzero(rng.random(len(ranges)) < 0.012):
+            legs = slice(first, first + rng.integers(3, 14))
+            ranges[legs] = np.minimum(ranges[legs], rng.uniform(0.6, 4.0))
+        records.append(
+            Scan(
+                stamp_ns=stamp_ns + 1,
+                ranges=np.where(np.isfinite(ranges), ranges, np.nan).astype(np.float32),
+                angle_min=LASER.angle_min,
+                angle_increment=LASER.angle_increment,
+                reflector=np.zeros(len(ranges), np.bool_),
+            )
+        )
+    return Office(others, records, poses)
