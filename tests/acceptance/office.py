@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
@@ -44,6 +44,14 @@ class Office:
     records: list[Record]
     poses: np.ndarray
     """(K, 3) where the robot was at each scan."""
+
+    def slipped(self, jump) -> Office:
+        """The same drive, but in the middle wheels say a motion [m, m, rad] that the robot has not made."""
+        records = list(self.records)
+        middle = next(k for k in range(len(records) // 2, len(records)) if isinstance(records[k], Odometry))
+        moved = se2.compose(records[middle].displacement, np.array(jump))
+        records[middle] = replace(records[middle], displacement=moved)
+        return replace(self, records=records)
 
     def localized(self) -> RunColumns:
         """By contours alone, with default parameters."""

@@ -198,6 +198,19 @@ def test_a_robot_with_poor_wheels_in_an_office_that_others_mapped_is_not_lost_fo
     assert lost <= 0.005 * cycles
 
 
+def test_a_robot_that_slips_in_that_office_is_found_by_its_contours(shared_data, seeds):
+    """0.4 m and 20 degrees at once: operational and 0.5 m off for no more than 15 scans, and right at the end."""
+    floor = read_floor_map(shared_data / "maps" / "utexas_gdc_3" / "3.yaml")
+    for seed in seeds(2, 12):
+        office = drive(floor, seed, 40.0).slipped((0.3, 0.25, 0.35))
+        columns = office.localized()
+        off = np.hypot(*(columns.means - office.poses)[:, :2].T)
+        wrong = (columns.modes == Mode.OPERATIONAL) & (off > 0.5)
+        assert max(len(list(group)) if key else 0 for key, group in itertools.groupby(wrong)) <= 15
+        assert columns.modes[-1] == Mode.OPERATIONAL
+        assert off[-1] < 0.1
+
+
 @pytest.mark.with_all_seeds
 def test_with_three_reflectors_contours_are_better_than_either_alone(seeds):
     """In the warehouse, along an aisle: the virtual map is as exact as its cells, and the parameters say so."""
