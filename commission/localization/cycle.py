@@ -421,6 +421,7 @@ def with_contours(  # noqa: PLR0917 - the filter's state around one scan
         busy,
         figures,
         is_invariant(model.gate.kind),
+        before.mode == LOST,
     )
 
 

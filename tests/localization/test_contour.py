@@ -81,7 +81,9 @@ def observed(floor: FloorMap, belief: PoseGaussian, ranges, *, given=EXACT, cros
         AT_ONCE,
     )
     figures, busy = np.zeros(12), None if cross is None else np.zeros(1, np.int64)
-    after = observe_contours(belief, scan, model, AT_REST, NOT_YET, 0.0, 0, NOTHING_KNOWN, cross, busy, figures, False)
+    after = observe_contours(
+        belief, scan, model, AT_REST, NOT_YET, 0.0, 0, NOTHING_KNOWN, cross, busy, figures, False, False
+    )
     return after, figures
 
 

@@ -96,16 +96,32 @@ def test_a_room_confirms_a_pose_after_twenty_scans():
     assert modes.index(Mode.OPERATIONAL) == 19
 
 
-def test_a_vehicle_that_was_carried_away_in_a_room_without_reflectors_is_lost_after_ten_scans():
+def test_a_vehicle_that_was_carried_away_in_a_room_without_reflectors_is_lost_after_ten_scans_and_found():
     floor = room()
     localizer = localizer_in(floor, TRUTH)
     assert stand(localizer, floor, TRUTH, 20)[-1].mode == Mode.OPERATIONAL
     moved = stand(localizer, floor, np.add(TRUTH, (0.5, 0.3, 0.0)), 40, first=20)
     modes = [each.mode for each in moved]
     assert modes.index(Mode.LOST) in (9, 10)
-    assert Mode.OPERATIONAL not in modes[10:]
-    # Carried back, it is believed again: such a map has nothing to search.
-    assert stand(localizer, floor, TRUTH, 10, first=60)[-1].mode == Mode.OPERATIONAL
+    # Its belief grows until the gate opens: it is operational again where it is, and nowhere else.
+    assert modes[-1] == Mode.OPERATIONAL
+    for each in moved[10:]:
+        if each.mode == Mode.OPERATIONAL:
+            assert np.hypot(*(each.posterior.mean - TRUTH)[:2] - (0.5, 0.3)) < 0.01
+    # Carried back, it is found again.
+    back = stand(localizer, floor, TRUTH, 40, first=60)[-1]
+    assert back.mode == Mode.OPERATIONAL
+    assert np.hypot(*(back.posterior.mean - TRUTH)[:2]) < 0.01
+
+
+def test_a_lost_vehicle_is_not_found_where_too_few_points_lie_on_contours_or_too_many_go_through_them():
+    floor = room()
+    localizer = localizer_in(floor, TRUTH)
+    stand(localizer, floor, TRUTH, 20)
+    far = np.array((6.5, 2.5, 0.0))
+    modes = [each.mode for each in stand(localizer, floor, far, 120, first=20)]
+    # The room has no place within reach of the belief that looks like this one.
+    assert Mode.OPERATIONAL not in modes[15:]
 
 
 def test_beams_go_through_walls_where_a_ray_caster_meets_one_earlier():
