@@ -139,7 +139,8 @@ def _mixed_beams(  # noqa: PLR0917 - a scan and a cluster in it
     while goes_on and beam < end and beam - last <= MOST_MIXED + 1:
         k = beam if beam < count else beam - count
         goes_on = _lit(ranges, flags, k)
-        is_behind &= not goes_on or ranges[k] >= here
+        # One at the range of the body again is of the body, and what lies before it no edge.
+        is_behind &= not goes_on or ranges[k] > here + rule.range_jump
         beam += goes_on
     found = beam - last - 1
     return found if is_behind and found <= MOST_MIXED else 0
@@ -163,10 +164,12 @@ def body_of(  # noqa: PLR0917 - a scan and a cluster in it
     range - nearest <= max(largest radius, steepest slope d |b|) + 3 sqrt(2) sigma: how much deeper
     than its nearest beam a post or plate can be at the angle b from it, and noise. Derived.
     """
-    if rule.widest == 0.0 or last - first < 2:
+    if rule.widest == 0.0 or last == first:
         return first, last
+    if last - first == 1:
+        return _without_mixed(ranges, flags, beams, first, last, rule)
     count = beams.used
-    # Nearly always neither edge lies deeper than the middle: then nothing else is looked at.
+    # Nearly always neither edge lies deeper than the middle, or the middle deeper than an edge.
     half = (last - first) // 2
     middle, low, high = first + half, first, last
     middle, low, high = (
@@ -174,8 +177,8 @@ def body_of(  # noqa: PLR0917 - a scan and a cluster in it
         low if low < count else low - count,
         high if high < count else high - count,
     )
-    deepest = ranges[middle] + max(0.5 * rule.widest, rule.steepest * ranges[middle] * abs(beams.increment) * half)
-    if flags[middle] and ranges[low] <= deepest and ranges[high] <= deepest:
+    deep = max(0.5 * rule.widest, rule.steepest * ranges[middle] * abs(beams.increment) * half)
+    if flags[middle] and abs(ranges[low] - ranges[middle]) <= deep and abs(ranges[high] - ranges[middle]) <= deep:
         return first, last
     return _without_mixed(ranges, flags, beams, first, last, rule)
 

@@ -398,3 +398,28 @@ def test_fitted_circle_is_better_than_the_central_beam(distance: float, beam_wid
     )
     # The mean of 400 draws of 10 mm scatters by half a millimetre.
     assert abs(circle[:, 0].mean()) <= max(abs(central[:, 0].mean()), 0.001)
+
+
+@pytest.mark.parametrize("center", ["circle", "central_beam"])
+def test_no_center_lies_beside_its_beams_whatever_bright_things_stand_behind(center: str) -> None:
+    """Bodies of one to six beams, some of which end up to metres behind: a center is at them, give or take a radius."""
+    rng = np.random.default_rng(0)
+    for _ in range(3000):
+        count, distance = int(rng.integers(1, 7)), rng.uniform(0.7, 12.0)
+        body = distance + rng.normal(0.0, 0.01, count)
+        for _ in range(rng.integers(0, 3)):
+            body[rng.integers(count)] = distance + rng.exponential(2.0)
+        ranges, flags = np.full(60, 15.0), np.zeros(60, dtype=bool)
+        ranges[20 : 20 + count], flags[20 : 20 + count] = body, True
+        scan = Scan(
+            stamp_ns=0,
+            ranges=ranges.astype(np.float32),
+            angle_min=-20.0 * STEP,
+            angle_increment=STEP,
+            intensities=None,
+            reflector=flags,
+        )
+        for measured, bearing in found(scan, center=center).range_bearing:
+            beside = max(-bearing, bearing - (count - 1) * STEP, 0.0)
+            assert beside <= math.asin(RADIUS / measured) + STEP
+            assert body.min() - 0.05 <= measured <= body.max() + 0.1

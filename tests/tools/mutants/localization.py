@@ -24,6 +24,13 @@ SEVERAL = TESTS + "test_several_scans.py::"
 
 LOCALIZATION = (
     Mutant(
+        name="of two beams one from far behind draws the center aside",
+        file=FOLDER + "clusters.py",
+        find="if last - first == 1:",
+        replace="if last - first == -1:",
+        tests=(TESTS + "test_detector.py::test_no_center_lies_beside_its_beams_whatever_bright_things_stand_behind",),
+    ),
+    Mutant(
         name="what a frame believed by itself is handed out though a tag tells another place",
         file=FOLDER + "tag_start.py",
         find="output=before.output",
