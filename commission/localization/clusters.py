@@ -166,8 +166,6 @@ def body_of(  # noqa: PLR0917 - a scan and a cluster in it
     """
     if rule.widest == 0.0 or last == first:
         return first, last
-    if last - first == 1:
-        return _without_mixed(ranges, flags, beams, first, last, rule)
     count = beams.used
     # Nearly always neither edge lies deeper than the middle, or the middle deeper than an edge.
     half = (last - first) // 2

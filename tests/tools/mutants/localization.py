@@ -24,10 +24,10 @@ SEVERAL = TESTS + "test_several_scans.py::"
 
 LOCALIZATION = (
     Mutant(
-        name="of two beams one from far behind draws the center aside",
+        name="a deep beam in the middle of a cluster draws its center aside",
         file=FOLDER + "clusters.py",
-        find="if last - first == 1:",
-        replace="if last - first == -1:",
+        find="abs(ranges[low] - ranges[middle]) <= deep",
+        replace="ranges[low] - ranges[middle] <= deep",
         tests=(TESTS + "test_detector.py::test_no_center_lies_beside_its_beams_whatever_bright_things_stand_behind",),
     ),
     Mutant(
