@@ -26,8 +26,8 @@ LOCALIZATION = (
     Mutant(
         name="a deep beam in the middle of a cluster draws its center aside",
         file=FOLDER + "clusters.py",
-        find="abs(ranges[low] - ranges[middle]) <= deep",
-        replace="ranges[low] - ranges[middle] <= deep",
+        find="abs(ranges[high] - ranges[middle]) <= deep",
+        replace="ranges[high] - ranges[middle] <= deep",
         tests=(TESTS + "test_detector.py::test_no_center_lies_beside_its_beams_whatever_bright_things_stand_behind",),
     ),
     Mutant(
