@@ -303,9 +303,10 @@ def reels_of(inputs: CoverageInput, lattice: Lattice, progress: Progress = silen
     lattice : the points.
     progress : told how far it is; may raise to cancel.
     """
-    if inputs.temporary is None:
+    reels, rule = inputs.reels, inputs.temporary
+    if rule is None:
         return None
-    return reels_in_sight(inputs.reels, inputs.temporary, inputs.scanners, inputs.floor_map, lattice, progress)
+    return reels_in_sight(reels, rule, inputs.scanners, inputs.floor_map, lattice, progress)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -187,7 +187,7 @@ def cell_text(info: FieldInfo, value: Any) -> str:
     if isinstance(value, bool):
         return YES if value else NO
     if info.quantity is None:
-        return in_words(value)
+        return in_words(value) if info.options else str(value)
     return info.quantity.none if value is None else info.quantity.digits(value)
 
 

@@ -71,6 +71,8 @@ def test_cells_are_in_the_units_of_the_page_and_lose_no_digit() -> None:
         "note": "",
         "locked": "no",
     }
+    # Words of a choice are told apart by spaces; what a person has written stays as it is.
+    assert BY_KEY["id"].of_field(Reflector(id="A__1_b", x=0.0, y=0.0)) == "A__1_b"
     # What stands in a cell means what it was made from.
     for key, column in BY_KEY.items():
         means, value = column.means(cells[key]), getattr(reflector, key)
