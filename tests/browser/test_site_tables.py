@@ -80,6 +80,7 @@ def listed(page: OpenPage, head: str, rows: str = ROWS) -> list[str]:
 
 def cell(page: OpenPage, name: str, head: str) -> Locator:
     table = page.page.locator(".c-data:visible table", has=page.page.locator(f"tr[data-key='{name}']"))
+    table.locator("th", has_text=head).wait_for()
     heads = [each.strip(" ▴▾") for each in table.locator("th").all_inner_texts()]
     return table.locator(f"tr[data-key='{name}'] td").nth(heads.index(head))
 
@@ -94,6 +95,11 @@ def typed_into(page: OpenPage, name: str, head: str, text: str) -> None:
 
 def row(page: OpenPage, name: str) -> Locator:
     return page.page.locator(f".c-data:visible tr[data-key='{name}'] td:first-child")
+
+
+def is_drawn_selected(page: OpenPage, name: str) -> None:
+    """Wait until a row is seen to be selected: what is clicked before is not that row yet, or lies elsewhere."""
+    page.page.locator(f".c-data:visible tr[data-key='{name}'][aria-selected=true]").wait_for()
 
 
 def test_heads_name_the_units_and_sort_both_ways(page: OpenPage, served: Served) -> None:
@@ -113,13 +119,17 @@ def test_heads_name_the_units_and_sort_both_ways(page: OpenPage, served: Served)
 def test_rows_select_on_the_floor_one_several_and_all_between(page: OpenPage, served: Served) -> None:
     row(page, "R1").click()
     served.until(lambda: selected(served) == ("R1",))
+    is_drawn_selected(page, "R1")
     row(page, "R4").click(modifiers=["Control"])
     served.until(lambda: selected(served) == ("R1", "R4"))
+    is_drawn_selected(page, "R4")
     page.wait_for_text("2 selected")
     row(page, "R1").click(modifiers=["Control"])
     served.until(lambda: selected(served) == ("R4",))
+    is_drawn_selected(page, "R4")
     row(page, "R2").click()
     served.until(lambda: selected(served) == ("R2",))
+    is_drawn_selected(page, "R2")
     row(page, "R4").click(modifiers=["Shift"])
     served.until(lambda: selected(served) == ("R2", "R3", "R4"))
     marked = f"{ROWS}[aria-selected=true]"
@@ -172,7 +182,7 @@ def test_a_cell_is_a_draft_until_it_is_finished_and_then_one_undo_step(
 
 def test_escape_takes_the_entry_back_and_nothing_else(page: OpenPage, served: Served) -> None:
     row(page, "R3").click()
-    served.until(lambda: selected(served) == ("R3",))
+    is_drawn_selected(page, "R3")
     project, steps = served.state.project, len(served.state.undo)
     for text in ("9.9", ""):
         cell(page, "R3", "x [m]").click()  # a click in a row that is selected edits
@@ -267,5 +277,5 @@ def test_routes_stations_tags_and_zones_are_edited_and_selected_in_tables_of_the
         row(page, key).click()
         served.until(is_there)
         # The next click is for rows as they then lie: the selected one scrolls into view.
-        page.page.locator(f".c-data tr[data-key='{key}'][aria-selected=true]").wait_for()
+        is_drawn_selected(page, key)
     assert page.errors == []
