@@ -138,10 +138,10 @@ def fuzz(count: int, seed: int) -> Counter[str]:
     return told
 
 
-def main() -> None:
-    """Do what the command line says."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("count", type=int, help="telegrams to decode")
+def main(description: str | None, what: str, fuzz: Callable[[int, int], Counter[str]]) -> None:
+    """Do what a command line says: so many of something, changed by chance, and what became of them."""
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("count", type=int, help=what)
     parser.add_argument("--seed", type=int, default=1)
     words = parser.parse_args()
     for line, number in sorted(fuzz(words.count, words.seed).items()):
@@ -149,4 +149,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(__doc__, "telegrams to decode", fuzz)

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import argparse
 import random
 import sys
 import tempfile
@@ -27,7 +26,7 @@ from tests.io.recordings.test_carmen import flaser, log_of
 from tests.io.recordings.test_cut_recordings import cola_packets
 from tests.io.recordings.test_mcap_recording import NAMES, steps
 from tests.io.recordings.test_ros_bag import drive
-from tests.tools.fuzz_decoders import changed
+from tests.tools.fuzz_decoders import changed, main
 
 SLOW_S = 2.0
 """Time in which any of these small files is read [s]."""
@@ -102,15 +101,5 @@ def fuzz(count: int, seed: int) -> Counter[str]:
     return told
 
 
-def main() -> None:
-    """Do what the command line says."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("count", type=int, help="recordings to read")
-    parser.add_argument("--seed", type=int, default=1)
-    words = parser.parse_args()
-    for line, number in sorted(fuzz(words.count, words.seed).items()):
-        sys.stdout.write(f"{line:32} {number}\n")
-
-
 if __name__ == "__main__":
-    main()
+    main(__doc__, "recordings to read", fuzz)

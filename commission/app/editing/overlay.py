@@ -81,10 +81,12 @@ class Overlay(BasePanel):
         size = 0.9 * extent_of(project).mark_size()
         selected = selected_of(project, editor)
         centers = np.array([(r.x, r.y) for r in selected]).reshape(-1, 2)
-        ringed = np.concatenate([centers, _point_place(project, editor), _places(moved_posed(project, editor))])
+        # Once for all that is drawn of it: where a route attracts it, its nearest place is looked for.
+        posed = moved_posed(project, editor)
+        ringed = np.concatenate([centers, _point_place(project, editor), _places(posed)])
         self._selected.points = outline_segments(rings(ringed, 1.5 * size), theme.Height.EDITING)
-        self._preview.points = self._preview_of(view.state, editor, size)
-        self._draw_points(project, editor, size)
+        self._preview.points = self._preview_of(view.state, editor, posed, size)
+        self._draw_points(project, editor, posed, size)
         self._write(() if editor.tool is None else editor.tool.labels())
         self._draw_handle(centers, editor, size)
 
@@ -97,7 +99,7 @@ class Overlay(BasePanel):
             x, y = (float(value) for value in centers.mean(axis=0))
             self._handle.position = (x, y, theme.Height.EDITING)
 
-    def _preview_of(self, state: AppState, editor: Editor, size: float) -> np.ndarray:
+    def _preview_of(self, state: AppState, editor: Editor, posed: PosedMark | None, size: float) -> np.ndarray:
         """Return the lines of what is being dragged, drawn or measured."""
         project, height = state.project, theme.Height.EDITING
         lines: list[np.ndarray] = []
@@ -110,7 +112,6 @@ class Overlay(BasePanel):
         elif drag is not None and drag.grab is Grab.RECTANGLE:
             (x0, y0), (x1, y1) = drag.start, drag.now
             lines.append(outline_segments(np.array([[(x0, y0), (x1, y0), (x1, y1), (x0, y1)]]), height))
-        posed = moved_posed(project, editor)
         if posed is not None:
             is_tag = isinstance(posed, Tag)
             shape = tag_strokes((posed,), height) if is_tag else outline_segments(station_marks((posed,), size), height)
@@ -125,12 +126,11 @@ class Overlay(BasePanel):
             lines += [polyline_segments(line, height) for line in editor.tool.sketch(state, self._browser)]
         return np.concatenate(lines) if lines else NO_SEGMENTS
 
-    def _draw_points(self, project: Project, editor: Editor, size: float) -> None:
+    def _draw_points(self, project: Project, editor: Editor, posed: PosedMark | None, size: float) -> None:
         """Show the control points of the selected route, or the points drawn or measured so far."""
         places = [np.array(() if editor.tool is None else editor.tool.marks(), dtype=np.float64).reshape(-1, 2)]
         if editor.point is not None:
             places += [segment.control_points for segment in moved_route(project, editor)]
-        posed = moved_posed(project, editor)
         if posed is not None:
             places.append(np.array([heading_tip(project, posed)]))
         self._points.point_size = size
