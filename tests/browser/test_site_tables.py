@@ -198,6 +198,15 @@ def test_escape_takes_the_entry_back_and_nothing_else(page: OpenPage, served: Se
     assert len(served.state.undo) == steps
 
 
+def test_what_is_typed_into_a_cell_is_seen_whole(page: OpenPage, served: Served) -> None:
+    project = served.state.project
+    typed_into(page, "R3", "x [m]", "-123.4567")
+    assert page.page.evaluate("() => document.activeElement.scrollWidth <= document.activeElement.clientWidth")
+    page.page.keyboard.press("Escape")
+    page.page.locator("input.c-cell").wait_for(state="detached")
+    assert served.state.project is project
+
+
 @pytest.mark.parametrize(
     ("head", "text", "told"),
     [

@@ -151,7 +151,7 @@ div:has(>div>.c-top)>div:has(.c-now){{position:absolute}}
 .c-data tbody tr[aria-selected=true] td{{background:var(--c-selected-line)}}
 .c-data [data-edits]:hover{{text-decoration:underline dotted}}
 .c-data [data-due]{{opacity:.6}}
-.c-data .c-cell{{width:100%;min-width:3.2em;box-sizing:border-box;margin:-1px 0;padding:0 2px;font:inherit;
+.c-data .c-cell{{width:100%;min-width:6.5em;box-sizing:border-box;margin:-1px 0;padding:0 2px;font:inherit;
  color:inherit;background:{css(Surface.CARD.dark)};border:1px solid {css(Worded.BRAND.dark)};border-radius:2px;
  text-align:inherit}}
 .c-data td[data-refused]{{box-shadow:inset 0 0 0 1px {css(Worded.REFUSED.dark)}}}
