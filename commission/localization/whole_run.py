@@ -114,7 +114,7 @@ def run_segments(
     return _filtered(log, segments, detected, known, earlier=earlier, progress=part(progress, DETECTION_SHARE, 1.0))
 
 
-def state_before(run: RunColumns, log: RecordLog, cycle: int) -> FilterState:
+def state_before(run: RunColumns, log: RecordLog, cycle: int, near: Checkpoint | None = None) -> FilterState:
     """State after the cycle before (odometry after it not yet taken in): from it, the run goes on from `cycle`.
 
     Parameters
@@ -122,8 +122,10 @@ def state_before(run: RunColumns, log: RecordLog, cycle: int) -> FilterState:
     run : over `log`.
     log : the records.
     cycle : 0 to K; K is the state after the last cycle, `run.final` the one after the last record.
+    near : another checkpoint of the same run, perhaps a nearer one.
     """
-    checkpoint = max((c for c in run.checkpoints if c.cycle <= cycle), key=lambda c: c.cycle)
+    checkpoints = run.checkpoints if near is None else (*run.checkpoints, near)
+    checkpoint = max((c for c in checkpoints if c.cycle <= cycle), key=lambda c: c.cycle)
     state = checkpoint.state
     for segment, first, last in _chunks(run.segments, checkpoint.cycle, cycle):
         detected = run.detected.part(first, last)

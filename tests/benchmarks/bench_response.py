@@ -82,7 +82,7 @@ def of_server(runtime: Runtime, ear: Ear, number: int) -> tuple[list[float], lis
         selected.append(ear.since(begun, f"Reflector {each.id}<".encode()))
         time.sleep(0.3)
         begun = time.perf_counter()
-        runtime.post(Seek(3.0 + 2.0 * index))
+        runtime.post(Envelope(Seek(3.0 + 2.0 * index), Sender(number)))
         sought.append(ear.since(begun, b"c-now"))
         time.sleep(0.3)
     return selected, sought

@@ -145,7 +145,7 @@ class MapNode:
         """Draw the node relative to where the origin is now."""
         place = _for_viser(self.where, self._origin.to_scene(self._place))
         if isinstance(place, tuple):
-            setattr(self._handle, self.where, place)
+            viser_private.write_position(self._handle, place)
         else:
             viser_private.write_array(self._handle, self.where, place)
 
@@ -235,6 +235,20 @@ class MapCamera:
     def __setattr__(self, name: str, value: Any) -> None:
         """Set a property; a place in the map frame."""
         setattr(self._camera, name, self._origin.to_scene(value) if name in ("position", "look_at") else value)
+
+
+def set_points(node: Any, points: FloatArray) -> None:
+    """Move the points of lines or marks, whether they are in the map frame or hang on a placed node.
+
+    Parameters
+    ----------
+    node : a handle of such a scene.
+    points : (N, 3) or (N, 2, 3) [m], in the frame that the node is in.
+    """
+    if isinstance(node, MapNode):
+        node.points = points
+    else:
+        viser_private.write_array(node, "points", points.astype(np.float32))
 
 
 def _for_viser(where: str, place: FloatArray) -> tuple[float, ...] | NDArray[np.float32]:

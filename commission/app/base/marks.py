@@ -10,6 +10,7 @@ from viser import ImageHandle, LineSegmentsHandle, PointCloudHandle, SceneApi, S
 
 from commission.app.base import theme
 from commission.app.base.drawing import NO_POINTS, NO_SEGMENTS, Points
+from commission.app.base.map_scene import set_points
 from commission.planning.coverage import Lattice
 
 CASED_PX = 2.5
@@ -54,14 +55,14 @@ class Cased:
         points : (N, 2, 3) segments or (N, 3) places [m], frame of the parent node.
         cased : whether the floor has colors of a study, on which marks are not seen without a casing.
         """
-        self._marks.points = points
+        set_points(self._marks, points)
         if cased:
             below = np.array(points)
             # What is hidden far below stays there.
             below[..., 2] = np.minimum(below[..., 2], theme.Height.CASING)
-            self._casing.points = below
+            set_points(self._casing, below)
         elif self._is_cased:
-            self._casing.points = NO_POINTS if points.ndim == 2 else NO_SEGMENTS
+            set_points(self._casing, NO_POINTS if points.ndim == 2 else NO_SEGMENTS)
         self._is_cased = cased
 
     @property

@@ -83,6 +83,20 @@ def write_array(node: Any, name: str, array: NDArray[np.float32]) -> None:
         node._queue_update(name, array)
 
 
+def write_position(node: Any, place: tuple[float, ...]) -> None:
+    """Put a node where it belongs, however near that is to where it was: viser passes over a 100,000th part of the way.
+
+    Parameters
+    ----------
+    node : a handle of viser's.
+    place : (3,) [m], frame of the parent node.
+    """
+    if not np.array_equal(node._impl.position, place):
+        # Nothing is near to what is no number.
+        node._impl.position[:] = np.nan
+        node.position = place
+
+
 class Said:
     """A widget with the value that a person gave it, whatever has been written to it since."""
 

@@ -5,8 +5,6 @@ It is called by the owner thread alone and knows neither widgets, files nor jobs
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -83,7 +81,7 @@ class Playback:
     def replace(self, result: RunResult) -> None:
         """Show another run over the same drive; the cursor stays."""
         self._result = result
-        self._near: tuple[Checkpoint, ...] = ()
+        self._near: Checkpoint | None = None
         self._searched: tuple[SearchMoment, tuple[Hypothesis, ...]] | None = None
         self._inliers, self._outliers = (
             _Cloud(result.columns, chosen)
@@ -184,10 +182,8 @@ class Playback:
 
     def _state_before(self, cycle: int) -> FilterState:
         """State before a cycle; while the vehicle drives on, from the one before it."""
-        columns = self._result.columns
-        near = replace(columns, checkpoints=(*columns.checkpoints, *self._near))
-        state = state_before(near, self._result.inputs.log, cycle)
-        self._near = (Checkpoint(cycle, state),)
+        state = state_before(self._result.columns, self._result.inputs.log, cycle, self._near)
+        self._near = Checkpoint(cycle, state)
         return state
 
     def _accumulated(self, lived: int) -> Accumulated:
@@ -264,10 +260,13 @@ def _twist_at(log: RecordLog, stamp_ns: int, wheels: OdometryParameters) -> Floa
     stamps = log.odometry_stamps_ns
     first, last = np.searchsorted(stamps, (stamp_ns - TWIST_NS, stamp_ns + TWIST_NS), side="right").tolist()
     first = max(first, 1)
-    moved = np.zeros(3)
-    for displacement in as_driven(log.displacements[first:last], wheels):
-        moved = se2.compose(moved, displacement)
-    return se2.log(moved) / ((stamps[last - 1] - stamps[first - 1]) * 1e-9) if last > first else moved
+    if last <= first:
+        return np.zeros(3)
+    x = y = theta = 0.0
+    # Number by number: with each picture, arrays of three would take longest of all that a scan needs.
+    for dx, dy, dtheta in as_driven(log.displacements[first:last], wheels).tolist():
+        x, y, theta = se2.compose_scalars(x, y, theta, dx, dy, dtheta)
+    return np.array(se2.log_scalars(x, y, theta)) / ((stamps[last - 1] - stamps[first - 1]) * 1e-9)
 
 
 def _twist_over(log: RecordLog, stamp_ns: int, usual_ns: int, wheels: OdometryParameters) -> FloatArray:
