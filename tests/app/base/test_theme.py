@@ -6,7 +6,7 @@ Contrast after WCAG 2.1 and distance after CIE 1976 are computed here, from the 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from itertools import combinations
 from pathlib import Path
@@ -14,16 +14,18 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from viser import LineSegmentsHandle
 
 import commission
 from commission.app.base import style, theme
 from commission.app.base.drawing import NO_SEGMENTS
 from commission.app.base.grid_layer import GridLayer
 from commission.app.base.layer import Layer
-from commission.app.base.marks import add_cased_lines
+from commission.app.base.marks import Cased, add_cased_lines
 from commission.app.base.paints import PAINTS, Floor, Paint, Plan, Run, Surface, Worded
 from commission.app.base.ramp import colors
 from commission.app.base.relight import light_color
+from commission.app.base.server import start_server
 from commission.app.floor_map.draft_layer import MapDraftLayer
 from commission.app.launch import FEATURES
 from commission.app.prediction.ribbon_layer import RibbonLayer
@@ -236,26 +238,30 @@ def test_thin_marks_are_seen_on_heatmaps_by_a_casing(make: Callable[[Any], Layer
             free.remove(below[0])
 
 
-def test_a_casing_lies_below_every_mark_at_the_same_places() -> None:
-    scene = Sketch()
-    lines = add_cased_lines(cast("Any", scene), "/lines", theme.TRAIL, 1.5)
-    lines.points = np.array([[(1.0, 2.0, theme.Height.TRAIL), (3.0, 4.0, theme.Height.TRAIL)]])
-    casing, marks = lines.nodes
+@pytest.fixture
+def cased_lines() -> Iterator[Cased]:
+    """Lines in a scene of viser's, and not in a sketch of one: what moves is written past its setters."""
+    server = start_server("127.0.0.1", 0)
+    yield add_cased_lines(server.scene, "/lines", theme.TRAIL, 1.5)
+    server.stop()
+
+
+def test_a_casing_lies_below_every_mark_at_the_same_places(cased_lines: Cased) -> None:
+    cased_lines.points = np.array([[(1.0, 2.0, theme.Height.TRAIL), (3.0, 4.0, theme.Height.TRAIL)]])
+    casing, marks = (cast("LineSegmentsHandle", node) for node in cased_lines.nodes)
     np.testing.assert_array_equal(casing.points[..., :2], marks.points[..., :2])
     heights = {name: value for name, value in vars(theme.Height).items() if name.isupper()}
     assert {name for name, value in heights.items() if value < casing.points[0, 0, 2]} == {"FLOOR", "HEAT", "GRID"}
-    lines.points = NO_SEGMENTS
+    cased_lines.points = NO_SEGMENTS
     assert casing.points.max() <= -1000.0
 
 
-def test_what_moves_has_a_casing_while_the_floor_is_colored() -> None:
-    scene = Sketch()
-    lines = add_cased_lines(cast("Any", scene), "/lines", theme.TRAIL, 1.5)
-    casing, marks = lines.nodes
+def test_what_moves_has_a_casing_while_the_floor_is_colored(cased_lines: Cased) -> None:
+    casing, marks = (cast("LineSegmentsHandle", node) for node in cased_lines.nodes)
     drawn = np.array([[(1.0, 2.0, theme.Height.TRAIL), (3.0, 4.0, theme.Height.TRAIL)]])
     for colored in (False, True, False):
-        lines.draw(drawn, cased=colored)
-        assert np.array_equal(marks.points, drawn)
+        cased_lines.draw(drawn, cased=colored)
+        np.testing.assert_array_equal(marks.points, drawn.astype(np.float32))
         assert bool(casing.points.max() > 0.0) is colored
 
 
