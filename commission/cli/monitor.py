@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, UseAppendAction, arg
 
+from commission.cli.parsing import recording_names
 from commission.errors import UsageError
 
 if TYPE_CHECKING:
@@ -73,9 +74,7 @@ class MonitorCommand:
                 diagnoses.append(diagnosed_drive(project, log, start_of(project, log)))
             except UsageError as error:
                 raise UsageError(f"{path}: {error}") from None
-        names = tuple(path.stem for path in self.recordings)
-        names = names if len(set(names)) == len(names) else tuple(map(str, self.recordings))
-        found = monitor(MonitorInput(names=names, diagnoses=tuple(diagnoses)))
+        found = monitor(MonitorInput(names=recording_names(self.recordings), diagnoses=tuple(diagnoses)))
         written: list[str] = []
         if self.out is not None:
             write_text(self.out, table_of(found))

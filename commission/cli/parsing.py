@@ -7,6 +7,7 @@ import io
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 
 import tyro
@@ -119,3 +120,14 @@ def initial_pose(text: str) -> InitialPose:
     if not all(sigma > 0.0 for sigma in sigmas):
         raise UsageError(f"--initial-pose {text!r} has a 1-sigma that is not positive; expected {POSE_FORM}")
     return InitialPose((x, y, theta), (sigmas[0], sigmas[1], sigmas[2]))
+
+
+def recording_names(paths: Sequence[Path]) -> tuple[str, ...]:
+    """Names of recordings for a person: short ones, or all of each path where two were the same.
+
+    Parameters
+    ----------
+    paths : as they were typed.
+    """
+    names = tuple(path.stem for path in paths)
+    return names if len(set(names)) == len(names) else tuple(map(str, paths))

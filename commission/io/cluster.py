@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import itertools
 import logging
+import warnings
 from collections.abc import Generator, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -53,7 +54,7 @@ class Cluster:
 
         rest = iter(tasks)
         shared = self.client.scatter(given, broadcast=True, hash=False)
-        submit = functools.partial(self.client.submit, _done, work, shared, pure=False)
+        submit = functools.partial(self._submitted, work, shared)
         under_way = {submit(task): task for task in itertools.islice(rest, AHEAD * self.count)}
         arriving = as_completed(list(under_way), loop=self.client.loop)
         try:
@@ -66,6 +67,12 @@ class Cluster:
         finally:
             # Cancelled, or one has failed: nobody waits for the others.
             self.client.cancel(list(under_way), force=True)
+
+    def _submitted(self, work: Work[Any, Any, Any], shared: Any, task: Any) -> Any:
+        """Future of a task, which lies with the scheduler: even a whole drive, so that none is lost with a worker."""
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "Sending large graph", UserWarning)
+            return self.client.submit(_done, work, shared, task, pure=False)
 
 
 def _done(work: Work[Any, Any, Any], given: Any, task: Any) -> Any:

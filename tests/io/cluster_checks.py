@@ -11,7 +11,8 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -20,6 +21,8 @@ from commission.errors import UsageError
 from commission.io import cluster as cluster_module
 from commission.io.cluster import cluster
 from commission.simulation.random_faults import FaultRates
+from commission.studies.calibration_drives import calibrate_drives
+from commission.studies.calibration_values import CalibrationInput
 from commission.studies.monte_carlo import monte_carlo
 from commission.studies.monte_carlo_figures import MonteCarloInput, MonteCarloResult
 from commission.studies.run import RunInput
@@ -64,8 +67,8 @@ def address_in(process: subprocess.Popen[str]) -> str:
     raise AssertionError("the scheduler did not start")
 
 
-@pytest.fixture(scope="module")
-def scheduler() -> Iterator[tuple[str, list[subprocess.Popen[str]]]]:
+@contextmanager
+def two_workers() -> Generator[tuple[str, list[subprocess.Popen[str]]]]:
     boss = started("dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard")
     workers: list[subprocess.Popen[str]] = []
     try:
@@ -84,6 +87,12 @@ def scheduler() -> Iterator[tuple[str, list[subprocess.Popen[str]]]]:
         for process in (*workers, boss):
             process.kill()
             process.communicate()
+
+
+@pytest.fixture(scope="module")
+def scheduler() -> Iterator[tuple[str, list[subprocess.Popen[str]]]]:
+    with two_workers() as found:
+        yield found
 
 
 def same(one: MonteCarloResult, other: MonteCarloResult) -> bool:
@@ -112,6 +121,33 @@ def test_a_cluster_gives_the_same_result_also_when_a_worker_is_killed(
         assert same(monte_carlo(INPUTS, kill_one, workers=found), local)
     assert workers[0].wait(10.0) == -signal.SIGKILL
     assert workers[1].poll() is None
+
+
+def test_many_drives_are_calibrated_as_here_also_when_a_worker_is_killed() -> None:
+    def drives() -> Iterator[tuple[str, CalibrationInput]]:
+        for seed in range(1, 6):
+            log = drive(20.0, bias=0.03, seed=seed)
+            yield f"drive {seed}", CalibrationInput.of(PROJECT, log, Start(start(), StartOrigin.GIVEN))
+
+    local = calibrate_drives(drives(), 5)
+    told: list[str] = []
+    with two_workers() as (address, workers), cluster(address) as found:
+        assert found.count == 2
+
+        def kill_one(_fraction: float, message: str, /) -> None:
+            told.append(message)
+            if message.startswith("1 of"):
+                workers[0].send_signal(signal.SIGKILL)
+
+        there = calibrate_drives(drives(), 5, kill_one, workers=found)
+        assert workers[0].wait(10.0) == -signal.SIGKILL
+        assert workers[1].poll() is None
+    assert told[-1] == "5 of 5 drives"
+    assert [each.name for each in there.inputs.drives] == [f"drive {seed}" for seed in range(1, 6)]
+    assert [each.values for each in there.inputs.drives] == [each.values for each in local.inputs.drives]
+    assert (there.values, there.notes) == (local.values, local.notes)
+    bias = next(each for each in there.proposed if each.key == "observation.range_bias")
+    assert abs(bias.proposed - 0.03) < 0.001
 
 
 def test_another_version_on_a_worker_is_refused(
