@@ -1,6 +1,7 @@
 // A press on the floor is answered before it is drawn: viser draws a frame as soon as a button goes down or up, in which
-// nothing has changed yet. Without a graphics card that frame takes a tenth of a second and more, and what the program
-// answers waits behind it. So that frame comes a little later, and not at all where the answer has been drawn by then.
+// nothing has changed yet, and one when the pointer comes over something that can be pressed, or leaves it. Without a
+// graphics card such a frame takes a tenth of a second and more, and what the program answers waits behind it. So it comes
+// a little later, when the pointer rests, and not at all where the answer has been drawn by then.
 (() => {
   if (window.commissionPostpones) return; // the server sends this script again after each reconnection
   window.commissionPostpones = true;
@@ -17,7 +18,8 @@
     return request;
   }
 
-  function begin() {
+  function begin(event) {
+    if (event.type === "pointermove" && event.buttons) return; // something is dragged, which is to be seen at once
     const viewer = window.__viserMutable;
     if (viewer?.requestRender && !viewer.requestRender.isPostponing)
       viewer.requestRender = postponing(viewer.requestRender);
@@ -25,7 +27,8 @@
     setTimeout(end); // whoever stops an event keeps it from the listeners below
   }
   const end = () => { isPressing = false; };
-  for (const kind of ["pointerdown", "pointerup"]) {
+  // Not all that move over the page come to its window again: R3F hears them at the floor, and leaves it by `pointerleave`.
+  for (const kind of ["pointerdown", "pointerup", "pointermove", "pointerleave"]) {
     addEventListener(kind, begin, true);
     addEventListener(kind, end);
   }

@@ -45,6 +45,14 @@ _LIT_SHEETS = """() => {
 """Filled meshes beyond the size of a vehicle with light at each pixel."""
 
 
+_FRAMES_ASKED_FOR = """() => {
+  const asked = window.__asked = { moved: 0, at: [] };
+  window.__viserMutable.requestRender = () => asked.at.push(performance.now());
+  addEventListener("pointermove", () => { asked.moved = performance.now(); }, true);
+}"""
+"""Notes from now on when a frame is asked for, instead of drawing one, and when the pointer moved last [ms]."""
+
+
 def metre(page: OpenPage) -> float:
     """Length of a metre of the floor on the screen [pixels]."""
     return float(np.hypot(*(np.array(page.pixel_of((1.0, 0.0))) - page.pixel_of((0.0, 0.0)))))
@@ -149,3 +157,26 @@ def test_a_question_mark_shows_all_keys(page: OpenPage) -> None:
     page.page.keyboard.press("?")
     page.wait_for_text("Play or pause")
     assert page.errors == []
+
+
+def test_a_frame_for_the_pointer_waits_for_a_press_and_one_for_a_drag_does_not(
+    served: Served, window: Callable[..., OpenPage]
+) -> None:
+    # Without a graphics card a frame takes a tenth of a second, and what is pressed is answered behind it.
+    page = window(served.server)
+    page.open(nodes=["/reflectors/marks"])
+    page.page.mouse.move(5, 5)  # beside the floor, which can be pressed
+    page.page.wait_for_timeout(500)
+    page.page.evaluate(_FRAMES_ASKED_FOR)
+    page.page.mouse.move(*page.pixel_of(PLACE))
+    page.page.wait_for_function("window.__asked.at.length > 0", timeout=10_000)
+    assert page.page.evaluate("window.__asked.at[0] - window.__asked.moved") >= 140.0
+    x, y = page.pixel_of(PLACE)
+    page.page.mouse.move(x, y)
+    page.page.mouse.down(button="middle")
+    page.page.wait_for_timeout(500)
+    page.page.evaluate("window.__asked.at.length = 0")
+    page.page.mouse.move(x + 30.0, y)
+    page.page.wait_for_function("window.__asked.at.length > 0")
+    assert page.page.evaluate("window.__asked.at[0] - window.__asked.moved") < 140.0
+    page.page.mouse.up(button="middle")
