@@ -1,5 +1,5 @@
-// Reflectors, routes, stations, tags and zones as tables: heads sort, a row selects (with ctrl one more, with shift all
-// between), and a cell of the selected row, or any cell by a double click, is edited like each entry of the page
+// Reflectors, routes, stations, tags, zones and scanners as tables: heads sort, a row selects (with ctrl one more, with
+// shift all between; then a row above them all sets what they share), and a cell of the selected row, or any cell by a double click, is edited like each entry of the page
 // (entries.js): Enter, Tab or a click elsewhere finishes it, Escape takes it back, a refusal is said in the cell.
 //
 // The program sends what there is to see (commission/app/editing/data_table.py) and hears what is done.
@@ -8,7 +8,7 @@
   window.commissionSiteTables = true;
   const { make, whole, row, head } = window.commissionTable;
   const LOOK_EVERY_MS = 60, SAID_AT_MOST_MS = 1500, LOWEST_PX = 96, BELOW_PX = 4;
-  const YES = "yes", NO = "no";
+  const YES = "yes", NO = "no", ALL = "";
   const tabs = new Map(); // of each tab: what it shows
   // While a button of the mouse is held nothing is drawn anew: a row that is exchanged under it would not be clicked.
   let isHeld = false;
@@ -96,8 +96,25 @@
       const said = make("td", { colSpan: cells.length }, make("div", { textContent: refused }));
       return [line, make("tr", { className: "c-refusal" }, said)];
     });
+    if (table.every.length) rows.unshift(...everyRow(tab, table));
     const title = table.title ? [make("h4", { textContent: table.title })] : [];
     return [...title, whole(heads, rows)];
+  }
+
+  // What all that are selected share; an entry in it is for each of them.
+  function everyRow(tab, table) {
+    const cells = table.every.map((text, index) =>
+      text === null ? make("td") : cellOf(tab, table, ALL, table.columns[index], text, null));
+    cells[0].textContent = `All ${table.chosen}`;
+    const line = row(cells, "An entry here is for all that are selected", (event) => {
+      edit(event.target.closest("[data-edits]"));
+    });
+    line.className = "c-every";
+    line.dataset.key = ALL;
+    const refused = cells.map((cell) => cell.dataset.refused).filter(Boolean).join(" ");
+    if (!refused) return [line];
+    const said = make("td", { colSpan: cells.length }, make("div", { textContent: refused }));
+    return [line, make("tr", { className: "c-refusal" }, said)];
   }
 
   // Below each other numbers have as many decimals as the longest: 3.900 above 10.444.
@@ -108,7 +125,8 @@
     cell.textContent = decimals && Number.isFinite(Number(text)) ? Number(text).toFixed(decimals) : text;
     if (column.kind === "switch") {
       const box = make("input", { type: "checkbox", checked: text === YES, title: column.title });
-      box.setAttribute("aria-label", `${column.title} of ${key}`);
+      box.indeterminate = text !== YES && text !== NO;
+      box.setAttribute("aria-label", `${column.title} of ${key || "all"}`);
       box.onclick = (event) => event.stopPropagation();
       box.onchange = () => {
         tell(tab, enters(place, box.checked ? YES : NO));
@@ -133,8 +151,8 @@
     const line = event.currentTarget, isAlone = tab.list.querySelectorAll("tr[aria-selected=true]").length === 1;
     const cell = event.target.closest("[data-edits]");
     let how = "only";
-    if (table.several && event.shiftKey && tab.begin) how = "range";
-    else if (table.several && (event.ctrlKey || event.metaKey)) how = "toggle";
+    if (event.shiftKey && tab.begin) how = "range";
+    else if (event.ctrlKey || event.metaKey) how = "toggle";
     else if (cell && isAlone && line.getAttribute("aria-selected") === "true") return edit(cell);
     if (how !== "range") tab.begin = key;
     getSelection()?.removeAllRanges(); // shift marks text
@@ -151,7 +169,7 @@
     const input = isChoice ? make("select", {}, ...column.options.map((each) => make("option", { textContent: each })))
       : make("input", { type: "text", size: 1, spellcheck: false });
     input.value = text;
-    input.setAttribute("aria-label", `${column.title} of ${key}`);
+    input.setAttribute("aria-label", `${column.title} of ${key || "all"}`);
     input.className = "c-cell";
     if (!isChoice) input.dataset.says = JSON.stringify({ n: ++count, ...enters(cell.place, "") });
     // By it entries.js finds which widget hears what is entered.

@@ -26,7 +26,10 @@ def served() -> Iterator[Served]:
     square = ((1.0, 1.0), (3.0, 1.0), (3.0, 3.0), (1.0, 3.0))
     project = replace(
         room(),
-        stations=(Station(name="Dock", x=3.0, y=5.0, required_accuracy=0.01),),
+        stations=(
+            Station(name="Dock", x=3.0, y=5.0, required_accuracy=0.01),
+            Station(name="Gate", x=4.0, y=2.0, required_accuracy=0.02),
+        ),
         tags=(Tag(id="T1", x=4.0, y=5.0),),
         zones=(Zone(name="Racks", outline=square),),
     )
@@ -260,7 +263,7 @@ def test_routes_stations_tags_and_zones_are_edited_and_selected_in_tables_of_the
     page: OpenPage, served: Served
 ) -> None:
     page.open_tab("Routes")
-    page.wait_for_text("1 route, 1 station, 1 tag, 1 zone")
+    page.wait_for_text("1 route, 2 stations, 1 tag, 1 zone")
     project, name = served.state.project, served.state.project.routes[0].name
     browser = next(iter(served.state.browsers))
     for key, head, text, reached in (
@@ -287,4 +290,70 @@ def test_routes_stations_tags_and_zones_are_edited_and_selected_in_tables_of_the
         served.until(is_there)
         # The next click is for rows as they then lie: the selected one scrolls into view.
         is_drawn_selected(page, key)
+    assert page.errors == []
+
+
+def test_one_entry_sets_all_stations_that_are_selected(page: OpenPage, served: Served) -> None:
+    page.open_tab("Routes")
+    before, steps = served.state.project, len(served.state.undo)
+    row(page, "Dock").click()
+    is_drawn_selected(page, "Dock")
+    row(page, "Gate").click(modifiers=["Control"])
+    is_drawn_selected(page, "Gate")
+    page.page.locator(".c-selected", has_text="2 stations").wait_for(state="attached")
+    every = cell(page, "", "Within [mm]")
+    assert every.inner_text() == "", "they differ"
+    assert cell(page, "", "Name").inner_text() == "All 2"
+    # It lies below the heads and above the rows.
+    heads, first = (
+        page.page.locator("tr.c-every").locator("xpath=ancestor::table").locator("th").first,
+        row(page, "Dock"),
+    )
+    tops = [each.bounding_box() for each in (heads, every, first)]
+    assert all(box is not None for box in tops)
+    assert [box["y"] for box in tops if box] == sorted(box["y"] for box in tops if box)
+    every.click()
+    page.page.wait_for_function("() => document.activeElement.className === 'c-cell'")
+    page.page.keyboard.type("7.5", delay=20)
+    page.page.wait_for_timeout(150)
+    assert served.state.project == before, "nothing is entered while it is typed"
+    page.page.keyboard.press("Enter")
+    served.until(lambda: [each.required_accuracy for each in served.state.project.stations] == [0.0075, 0.0075])
+    assert len(served.state.undo) == steps + 1
+    page.page.wait_for_function("() => document.querySelector('.c-every').innerText.includes('7.5')")
+    # What is refused is said below it, once.
+    cell(page, "", "Within [mm]").click()
+    page.page.wait_for_function("() => document.activeElement.className === 'c-cell'")
+    page.page.keyboard.type("-1")
+    page.page.keyboard.press("Enter")
+    page.page.locator(".c-refusal", has_text="expected").wait_for(state="visible")
+    page.page.locator("input.c-cell").wait_for(state="detached")
+    page.page.keyboard.press("Control+z")
+    served.until(lambda: served.state.project == before)
+    page.page.keyboard.press("Delete")
+    served.until(lambda: served.state.project.stations == ())
+    page.page.keyboard.press("Control+z")
+    served.until(lambda: served.state.project == before)
+    assert page.errors == []
+
+
+def test_what_counts_in_a_zone_and_figures_of_a_scanner_are_entered_in_their_rows(
+    page: OpenPage, served: Served
+) -> None:
+    page.open_tab("Routes")
+    before = served.state.project
+    cell(page, "Racks", "By tags").locator("input").click()
+    served.until(lambda: "tags" not in served.state.project.zones[0].kinds)
+    typed_into(page, "Racks", "Corners [m]", "1 1, 3 1, 3 4, 1 4")
+    page.page.keyboard.press("Enter")
+    served.until(lambda: served.state.project.zones[0].outline[2] == (3.0, 4.0))
+    page.page.locator("input.c-cell").wait_for(state="detached")
+    typed_into(page, "scanner", "Scans per s", "12.5")
+    page.page.keyboard.press("Enter")
+    served.until(lambda: served.state.project.scanners[0].rate == 12.5)
+    page.page.locator("input.c-cell").wait_for(state="detached")
+    for _ in range(3):
+        page.page.keyboard.press("Control+z")
+        page.page.wait_for_timeout(100)
+    served.until(lambda: served.state.project == before)
     assert page.errors == []

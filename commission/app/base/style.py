@@ -149,6 +149,8 @@ div:has(>div>.c-top)>div:has(.c-now){{position:absolute}}
 .c-data tr[data-tint=warning] td{{background:{css(Surface.WARNING_LINE.dark)}}}
 .c-data tr[data-tint=error] td{{background:{css(Surface.ERROR_LINE.dark)}}}
 .c-data tbody tr[aria-selected=true] td{{background:var(--c-selected-line)}}
+.c-data .c-every td{{position:sticky;top:20px;z-index:1;background:{css(Surface.CARD.dark)};font-weight:600}}
+.c-data .c-every td:first-child{{z-index:2}}
 .c-data [data-edits]:hover{{text-decoration:underline dotted}}
 .c-data [data-due]{{opacity:.6}}
 .c-data .c-cell{{width:100%;min-width:6.5em;box-sizing:border-box;margin:-1px 0;padding:0 2px;font:inherit;

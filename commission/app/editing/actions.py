@@ -241,6 +241,18 @@ class SetScanner(Action):
 
 
 @dataclass(frozen=True, slots=True)
+class SetScannerField(Action):
+    """Set one number, or list of them, of a scanner."""
+
+    field: str
+    """Field of `Scanner`, or `field[index]`."""
+    value: object
+    """New value, SI and radians."""
+    of: str
+    """Name of the scanner."""
+
+
+@dataclass(frozen=True, slots=True)
 class SetEquipment(Action):
     """Set one number, or list of them, of vehicle or scanner."""
 

@@ -7,8 +7,8 @@ all entries. It writes one line of JSON into a text field that nobody sees; what
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Annotated, Any, Literal, TypeAlias
 
@@ -23,9 +23,12 @@ from commission.app.base.field_widget import hint_of, in_words, meant
 from commission.app.base.panel import Post, posting
 from commission.app.editing.table_actions import SortTable
 from commission.app.editing.table_reducer import TableOrder
+from commission.app.editing.typed_lists import LIKE, list_text, list_value
 from commission.site.fields import FieldInfo, fields_of, get_field
 from commission.site.quantity import Quantity, Switch
 
+ALL = ""
+"""Key of the row that sets all that are selected; nothing has an empty name."""
 YES, NO = "yes", "no"
 """Cells of what is on and off."""
 DIGITS = re.compile(r"(\d+)")
@@ -61,13 +64,16 @@ class TableColumn:
     """What is known about its field; none: it is of no single field."""
     is_number: bool = False
     """Whether its cells are numbers, which end below each other."""
+    words: Mapping[Any, str] | None = None
+    """What its values are called; none: as `info` says."""
 
     def of_field(self, value: object) -> str:
         """Return the cell of a value that has the field, as the page writes it."""
         info = self.info
         if info is None:
             raise ValueError(f"the column {self.key!r} is of no field; expected one that is")
-        return cell_text(info, get_field(value, self.key))
+        content = get_field(value, self.key)
+        return cell_text(info, content) if self.words is None else self.words[content]
 
     def means(self, text: str) -> Any:
         """Return what is meant by a text that is entered in one of its cells, SI and radians.
@@ -78,10 +84,14 @@ class TableColumn:
             it cannot be edited, it is no number, or the field's bounds do not allow it.
         """
         info = self.info
-        if info is None or self.kind is CellKind.FIXED:
-            raise ValueError(f"{self.title} cannot be entered; expected a cell that can")
         if self.kind is CellKind.SWITCH:
             return text == YES
+        if info is None or self.kind is CellKind.FIXED:
+            raise ValueError(f"{self.title} cannot be entered; expected a cell that can")
+        if info.name in LIKE:
+            return list_value(info.name, text, info.label)
+        if self.words is not None:
+            return next((value for value, word in self.words.items() if word == text), text)
         if info.quantity is None or info.quantity.none:
             return meant(info, text.strip())
         try:
@@ -119,8 +129,10 @@ class TableContent:
     """Its rows, in their order."""
     order: TableOrder
     """By what they are sorted."""
-    takes_several: bool = False
-    """Whether several rows can be selected."""
+    every: tuple[str | None, ...] = ()
+    """Cells of the row that sets all that are selected: what they share, none where several cannot; empty: no row."""
+    chosen: int = 0
+    """How many are selected, also where their rows are not shown."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,7 +144,7 @@ class TableUse:
     select: Callable[[str, str, str], Action]
     """From the key of a row, how it is selected (`only`, `toggle`, `range`) and the row where a range begins."""
     enter: Callable[[str, str, Any], Action]
-    """From the key of a row, that of a column and the new value (SI) to the action."""
+    """From the key of a row (`ALL`: of those that are selected), that of a column and the new value (SI)."""
 
 
 def columns_of(cls: type, *, fixed: Iterable[str] = (), titles: Mapping[str, str] | None = None) -> list[TableColumn]:
@@ -145,9 +157,7 @@ def columns_of(cls: type, *, fixed: Iterable[str] = (), titles: Mapping[str, str
     titles : what columns are called otherwise than their fields.
     """
     found: list[TableColumn] = []
-    for name, info in fields_of(cls).items():
-        if len(info.descriptions) != 1:
-            continue
+    for name, info in _numbers_of(cls):
         description = info.descriptions[0]
         title = (titles or {}).get(name, info.label)
         if isinstance(description, Quantity) and description.shown_unit:
@@ -162,10 +172,41 @@ def columns_of(cls: type, *, fixed: Iterable[str] = (), titles: Mapping[str, str
                 kind=kind,
                 options=options,
                 info=info,
-                is_number=info.quantity is not None,
+                is_number=info.quantity is not None and name not in LIKE,
             )
         )
     return found
+
+
+def _numbers_of(cls: type) -> Iterator[tuple[str, FieldInfo]]:
+    """Fields of a type by their names; of what is described number by number each number."""
+    for name, info in fields_of(cls).items():
+        if len(info.descriptions) == 1:
+            yield name, info
+            continue
+        for index, description in enumerate(info.descriptions):
+            dotted = f"{name}[{index}]"
+            yield dotted, replace(info, name=dotted, kind=float, is_optional=False, descriptions=(description,))
+
+
+def shared_cells(
+    rows: Sequence[TableRow], columns: Sequence[TableColumn], alone: Collection[str] = ()
+) -> tuple[str | None, ...]:
+    """Return the cells of the row that sets all rows that are selected; empty while fewer than two are.
+
+    Parameters
+    ----------
+    rows : of a table, also those that are not shown.
+    columns : of the same.
+    alone : keys of those that several cannot share.
+    """
+    chosen = [row.cells for row in rows if row.is_selected]
+    if len(chosen) < 2:
+        return ()
+    return tuple(
+        None if column.kind is CellKind.FIXED or column.key in alone else cells[0] if len(set(cells)) == 1 else ""
+        for column, cells in zip(columns, zip(*chosen, strict=True), strict=True)
+    )
 
 
 def _kind_of(info: FieldInfo) -> CellKind:
@@ -186,6 +227,8 @@ def cell_text(info: FieldInfo, value: Any) -> str:
     """
     if isinstance(value, bool):
         return YES if value else NO
+    if info.name in LIKE:
+        return list_text(value)
     if info.quantity is None:
         return in_words(value) if info.options else str(value)
     return info.quantity.none if value is None else info.quantity.digits(value)
@@ -341,7 +384,8 @@ def _sent(table: TableContent) -> dict[str, Any]:
     return {
         "name": table.name,
         "title": table.title,
-        "several": table.takes_several,
+        "every": list(table.every),
+        "chosen": table.chosen,
         "sorted": [table.order.column, table.order.is_down],
         "columns": [
             {

@@ -100,6 +100,8 @@ class Editor:
     """The selected control point; its route is the selected one."""
     posed: PosedKey | None = None
     """The selected station or tag."""
+    further: tuple[str, ...] = ()
+    """Names of what is selected besides the station, the tag or the route: more of its kind."""
     drag: Drag | None = None
     """A drag under way."""
     last_click: Point | None = None
@@ -115,6 +117,7 @@ class Editor:
         *,
         point: ControlPoint | None = None,
         posed: PosedKey | None = None,
+        further: tuple[str, ...] = (),
     ) -> Editor:
         """Return the editor with this selected and nothing else.
 
@@ -123,8 +126,9 @@ class Editor:
         reflectors : ids.
         point : control point of a route.
         posed : station or tag.
+        further : names of more of the same kind as the station, the tag or the point's route.
         """
-        return replace(self, selected=reflectors, point=point, posed=posed)
+        return replace(self, selected=reflectors, point=point, posed=posed, further=further)
 
     def using(self, tool: Tool | None, state: AppState) -> Editor:
         """Return the editor with another tool: what was begun with the old one is dropped, unless that tool keeps it.

@@ -22,8 +22,8 @@ from commission.app.editing import actions
 from commission.app.editing.editor import Editor, Grab
 from commission.app.editing.gestures import moved, selected_of
 from commission.app.editing.posed_gestures import heading_tip, moved_posed
-from commission.app.editing.posed_kinds import PosedMark
-from commission.app.editing.route_gestures import curve, moved_route
+from commission.app.editing.posed_kinds import PosedMark, marks_of
+from commission.app.editing.route_gestures import curve, moved_route, routes_of
 from commission.app.editing.station_layer import station_marks
 from commission.app.editing.tag_layer import tag_strokes
 from commission.app.editing.tool import Label
@@ -83,7 +83,9 @@ class Overlay(BasePanel):
         centers = np.array([(r.x, r.y) for r in selected]).reshape(-1, 2)
         # Once for all that is drawn of it: where a route attracts it, its nearest place is looked for.
         posed = moved_posed(project, editor)
-        ringed = np.concatenate([centers, _point_place(project, editor), _places(posed)])
+        further = [(mark.x, mark.y) for mark in marks_of(project, editor)[1:]]
+        more = np.array(further, dtype=np.float64).reshape(-1, 2)
+        ringed = np.concatenate([centers, _point_place(project, editor), _places(posed), more])
         self._selected.points = outline_segments(rings(ringed, 1.5 * size), theme.Height.EDITING)
         self._preview.points = self._preview_of(view.state, editor, posed, size)
         self._draw_points(project, editor, posed, size)
@@ -122,6 +124,8 @@ class Overlay(BasePanel):
             for segment in moved_route(project, editor):
                 lines.append(polyline_segments(segment.control_points, height))
                 lines.append(polyline_segments(curve(segment), height))
+            for name in routes_of(project, editor)[1:]:
+                lines += [polyline_segments(curve(segment), height) for segment in project.route(name).segments]
         if editor.tool is not None:
             lines += [polyline_segments(line, height) for line in editor.tool.sketch(state, self._browser)]
         return np.concatenate(lines) if lines else NO_SEGMENTS

@@ -16,6 +16,7 @@ from commission.app.base.state import AppState
 from commission.app.editing.editor import PosedKind, editor_of
 from commission.app.editing.posed_actions import AlignStation, DeletePosed, SetPosed
 from commission.app.editing.posed_kinds import KINDS, PosedMark, mark_of
+from commission.app.editing.several import SEVERAL
 from commission.site.fields import get_field, names_of
 from commission.site.stations import ACCURACY, DOCKING, TRANSIT
 
@@ -65,8 +66,11 @@ class PosedFields:
 
     def show(self, state: AppState) -> None:
         """Show the selected one."""
-        mark = self._selected(state)
+        mark, several = self._selected(state), SEVERAL[KINDS[self._kind].field]
+        chosen = several.chosen(state, self._browser)
         show(self._folder, visible=mark is not None)
+        for field in several.alone:
+            show(self._fields[field], visible=len(chosen) < 2)
         name = "" if mark is None else KINDS[self._kind].named.key_of(mark)
         if name and name != self._shown:
             self._inputs.forget()

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
 from commission.app.base.actions import Point
-from commission.app.editing.editor import PosedKey, PosedKind
+from commission.app.editing.editor import Editor, PosedKey, PosedKind
 from commission.site.editing.named import STATIONS, TAGS, Named
 from commission.site.editing.stations import aligned, on_route
 from commission.site.project import Project
@@ -108,3 +108,18 @@ def mark_of(project: Project, key: PosedKey | None) -> PosedMark | None:
         return None
     kind = KINDS[key.kind]
     return next((item for item in kind.all_of(project) if kind.named.key_of(item) == key.name), None)
+
+
+def marks_of(project: Project, editor: Editor) -> tuple[PosedMark, ...]:
+    """Return all stations or tags that are selected, the first one first; those that are gone are left out.
+
+    Parameters
+    ----------
+    project : has them.
+    editor : of a browser.
+    """
+    if editor.posed is None:
+        return ()
+    kind = editor.posed.kind
+    found = (mark_of(project, PosedKey(kind, name)) for name in (editor.posed.name, *editor.further))
+    return tuple(mark for mark in found if mark is not None)

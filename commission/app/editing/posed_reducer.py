@@ -11,9 +11,11 @@ from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState, Edit, edited
 from commission.app.editing import posed_actions as actions
 from commission.app.editing.editor import PosedKey, PosedKind, editor_of
-from commission.app.editing.posed_kinds import KINDS, PosedMark, mark_of
+from commission.app.editing.posed_kinds import KINDS, PosedMark, mark_of, marks_of
+from commission.app.editing.table_actions import SetRows
 from commission.errors import UsageError
 from commission.site.fields import with_field
+from commission.site.quantity import counted_text
 
 
 def _selected(state: AppState, kind: PosedKind, sender: Sender, called: str = "") -> PosedMark:
@@ -70,6 +72,8 @@ def move_posed(action: actions.MovePosed, state: AppState, sender: Sender) -> Ou
 @reduce.register
 def set_posed(action: actions.SetPosed, state: AppState, sender: Sender) -> Outcome:
     posed, mark = KINDS[action.kind], _selected(state, action.kind, sender, action.of)
+    if not action.of and len(marks_of(state.project, editor_of(state, sender.browser))) > 1:
+        return reduce(SetRows(posed.field, action.field, action.value), state, sender)
     changed = with_field(mark, action.field, action.value, f"field of a {action.kind}")
     called, field = posed.called(mark), action.field
     is_name = field == posed.named.key
@@ -90,5 +94,7 @@ def align_station(_action: actions.AlignStation, state: AppState, sender: Sender
 @reduce.register
 def delete_posed(action: actions.DeletePosed, state: AppState, sender: Sender) -> Outcome:
     posed, mark = KINDS[action.kind], _selected(state, action.kind, sender)
-    left = posed.named.remove(posed.all_of(state.project), posed.named.key_of(mark))
-    return _with_marks(state, action.kind, left, Edit(f"delete {posed.called(mark)}", sender), None)
+    marks = marks_of(state.project, editor_of(state, sender.browser))
+    left = tuple(each for each in posed.all_of(state.project) if each not in marks)
+    what = posed.called(mark) if len(marks) == 1 else counted_text(len(marks), action.kind)
+    return _with_marks(state, action.kind, left, Edit(f"delete {what}", sender), None)

@@ -245,6 +245,8 @@ def select_reflectors(action: actions.SelectReflectors, state: AppState, sender:
 @reduce.register
 def delete_selected(_action: actions.DeleteSelected, state: AppState, sender: Sender) -> Outcome:
     editor = editor_of(state, sender.browser)
+    if editor.point is not None and editor.further:
+        return reduce(actions.DeleteRoute(), state, sender)
     if editor.point is not None and not editor.selected:
         return reduce(actions.DeleteControlPoint(), state, sender)
     if editor.posed is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 from viser import GuiApi
 
@@ -14,12 +14,14 @@ from commission.app.base.panel import BasePanel, Post
 from commission.app.base.view import PageView
 from commission.app.editing import actions
 from commission.app.editing.data_table import (
+    ALL,
     DataTables,
     TableContent,
     TableRow,
     TableUse,
     between,
     columns_of,
+    shared_cells,
     sorted_rows,
 )
 from commission.app.editing.editor import Editor
@@ -30,6 +32,8 @@ from commission.site.reflectors import Reflector, ReflectorMap
 ROWS = 40
 """Rows that are shown at once."""
 NAME = "reflectors"
+ALONE = ("id", "x", "y")
+"""Fields that several reflectors cannot share."""
 COLUMNS = tuple(columns_of(Reflector, titles={"id": "Name"}))
 BY_KEY = {column.key: column for column in COLUMNS}
 
@@ -52,7 +56,7 @@ class ReflectorTable(BasePanel):
         show(self._page.widget, visible=False)
         look_again_at(self._page.widget, post)
         self._count = gui.add_html("")
-        use = TableUse(columns=COLUMNS, select=self._selecting, enter=actions.SetReflector)
+        use = TableUse(columns=COLUMNS, select=self._selecting, enter=_entering)
         self.tables = DataTables(gui, post, NAME, {NAME: use})
         self._keys: tuple[str, ...] = ()
         self._by_id: dict[str, Reflector] = {}
@@ -81,9 +85,20 @@ class ReflectorTable(BasePanel):
         write_html(self._count, f"<div class='c-note' style='padding:2px 6px'>{', '.join(parts)}</div>")
         shown = (self._by_id[key] for key in self._keys[first : first + ROWS])
         rows = [TableRow(r.id, tuple(column.of_field(r) for column in COLUMNS), r.id in selected) for r in shown]
+        every = shared_cells(self._chosen_rows(reflectors, editor), COLUMNS, ALONE)
         self.tables.show(
-            [TableContent(name=NAME, columns=COLUMNS, rows=rows, order=order, takes_several=True)] if rows else []
+            [TableContent(name=NAME, columns=COLUMNS, rows=rows, order=order, every=every, chosen=len(selected))]
+            if rows
+            else []
         )
+
+    def _chosen_rows(self, reflectors: ReflectorMap, editor: Editor) -> list[TableRow]:
+        """Rows of all that are selected, also where another page of the table is shown."""
+        if len(editor.selected) < 2:
+            return []
+        chosen = frozenset(editor.selected)
+        found = (r for r in reflectors.reflectors if r.id in chosen)
+        return [TableRow(r.id, tuple(column.of_field(r) for column in COLUMNS), is_selected=True) for r in found]
 
     def _list(self, reflectors: ReflectorMap, order: TableOrder) -> None:
         """Sort those that hold what is sought, where anything of that has changed; only what is shown has all cells."""
@@ -117,3 +132,8 @@ class ReflectorTable(BasePanel):
                 return actions.SelectReflectors(between(self._keys, begin, key))
             case _:
                 return actions.SelectReflectors((key,), fly=True)
+
+
+def _entering(key: str, field: str, value: Any) -> Action:
+    """Return the action of an entry in a cell: of one reflector, or of all that are selected."""
+    return actions.SetSelected(field, value) if key == ALL else actions.SetReflector(key, field, value)

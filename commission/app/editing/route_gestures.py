@@ -68,6 +68,20 @@ def route_of(project: Project, editor: Editor) -> Route | None:
     return next((route for route in project.routes if route.name == editor.point.route), None)
 
 
+def routes_of(project: Project, editor: Editor) -> tuple[str, ...]:
+    """Return the names of all routes that are selected, that of the control point first.
+
+    Parameters
+    ----------
+    project : has them; those that are gone are left out.
+    editor : of a browser.
+    """
+    if editor.point is None:
+        return ()
+    names = {route.name for route in project.routes}
+    return tuple(name for name in (editor.point.route, *editor.further) if name in names)
+
+
 def segment_of(project: Project, editor: Editor) -> Segment | None:
     """Return the segment of the selected control point; none when it is gone."""
     route = route_of(project, editor)

@@ -18,18 +18,15 @@ from commission.app.editing import actions
 from commission.app.editing.editor import Editor, PosedKind
 from commission.app.editing.gestures import selected_of
 from commission.app.editing.posed_fields import PosedFields
-from commission.app.editing.posed_kinds import mark_of
+from commission.app.editing.posed_kinds import mark_of, marks_of
+from commission.app.editing.reflector_table import ALONE
 from commission.app.editing.route_fields import RouteFields
-from commission.app.editing.route_gestures import route_of
+from commission.app.editing.route_gestures import route_of, routes_of
 from commission.app.editing.site_tools import measurement
 from commission.site.fields import get_field, names_of
 from commission.site.project import Project
-from commission.site.quantity import DEGREES
+from commission.site.quantity import DEGREES, counted_text
 from commission.site.reflectors import Reflector, ReflectorKind
-
-ALONE = ("id", "x", "y")
-"""Fields that several reflectors cannot share."""
-
 
 NOTHING = (
     "<div class='c-note c-nothing' style='padding:4px 0'>Nothing is selected. Click a reflector, a station, a tag or a "
@@ -165,6 +162,9 @@ def _title(editor: Editor, reflectors: tuple[Reflector, ...], project: Project) 
     """Say what is selected; empty where that is nothing, or gone: an undo brings it back selected."""
     if reflectors:
         return f"Reflector {escaped(reflectors[0].id)}" if len(reflectors) == 1 else f"{len(reflectors)} reflectors"
+    several = marks_of(project, editor) if editor.posed is not None else routes_of(project, editor)
+    if len(several) > 1:
+        return counted_text(len(several), "route" if editor.posed is None else editor.posed.kind)
     if editor.point is not None:
         return _called("Route", editor.point.route) if route_of(project, editor) else ""
     if editor.posed is not None and mark_of(project, editor.posed) is not None:

@@ -15,12 +15,13 @@ from commission.app.base.state import AppState, Edit, edited
 from commission.app.editing import actions
 from commission.app.editing.editor import ControlPoint, Editor, Point, editor_of
 from commission.app.editing.refusals import in_words_of_the_page
-from commission.app.editing.route_gestures import route_of, segment_of
+from commission.app.editing.route_gestures import route_of, routes_of, segment_of
 from commission.errors import UsageError
 from commission.site.editing import routes as edits
 from commission.site.editing.named import ROUTES
 from commission.site.fields import get_field, with_field
 from commission.site.layout_brief import LayoutBrief
+from commission.site.quantity import counted_text
 from commission.site.routes import Route, Segment, route_named
 from commission.site.scanner import Scanner
 
@@ -143,10 +144,13 @@ def set_route(action: actions.SetRoute, state: AppState, sender: Sender) -> Outc
 
 @reduce.register
 def delete_route(_action: actions.DeleteRoute, state: AppState, sender: Sender) -> Outcome:
-    _, route, _, _ = _selected(state, sender)
-    routes = ROUTES.remove(state.project.routes, route.name)
-    layout = state.project.layout.renamed(route.name, None)
-    return with_routes(state, routes, Edit(f"delete {route.name}", sender), None, layout)
+    editor, route, _, _ = _selected(state, sender)
+    gone, layout = routes_of(state.project, editor), state.project.layout
+    routes = tuple(each for each in state.project.routes if each.name not in gone)
+    for name in gone:
+        layout = layout.renamed(name, None)
+    what = route.name if len(gone) == 1 else counted_text(len(gone), "route")
+    return with_routes(state, routes, Edit(f"delete {what}", sender), None, layout)
 
 
 def _where(editor: Editor, segment: Segment, point: ControlPoint) -> Point:
@@ -173,6 +177,15 @@ def set_scanner(action: actions.SetScanner, state: AppState, sender: Sender) -> 
         return Outcome(state)
     edit = Edit("change the scanner", sender, f"scanner {action.scanner.name}")
     return Outcome(edited(state, replace(state.project, scanners=scanners), edit))
+
+
+@reduce.register
+def set_scanner_field(action: actions.SetScannerField, state: AppState, sender: Sender) -> Outcome:
+    names = [each.name for each in state.project.scanners]
+    if action.of not in names:
+        raise UsageError(f"no scanner is called {action.of!r}; the project has: {', '.join(map(repr, names))}")
+    dotted = f"scanners[{names.index(action.of)}].{action.field}"
+    return reduce(actions.SetEquipment(dotted, action.value), state, sender)
 
 
 @reduce.register

@@ -15,3 +15,27 @@ class SortTable(Action):
     """Name of the table."""
     column: str
     """Key of the column."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChooseRows(Action):
+    """Select several things of one table and nothing else."""
+
+    table: str
+    """Name of the table."""
+    keys: tuple[str, ...]
+    """What they are told apart by; the last one is what single values are shown of."""
+    toggle: bool = False
+    """Whether they are selected besides the others, or, where they are selected already, no longer."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetRows(Action):
+    """Set one field of all that are selected in a table: one undo step."""
+
+    table: str
+    """Name of the table."""
+    field: str
+    """Key of the column."""
+    value: object
+    """New value, SI and radians."""

@@ -45,6 +45,8 @@ class CountKind(Action):
     """Which one."""
     counts: bool
     """Whether it does."""
+    of: str = ""
+    """Name of the zone; empty: the one that is shown."""
 
 
 @dataclass(frozen=True, slots=True)

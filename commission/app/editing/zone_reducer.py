@@ -13,6 +13,7 @@ from commission.errors import UsageError
 from commission.site.editing.named import ZONES
 from commission.site.fields import in_file, with_field
 from commission.site.layout_brief import low_high
+from commission.site.quantity import counted_text
 from commission.site.zones import ObservationKind, Zone
 
 WORDS = {"outline": "corners"}
@@ -25,6 +26,8 @@ class ShownZone:
 
     name: str = ""
     """Its name; a zone that is gone is the first one."""
+    further: tuple[str, ...] = ()
+    """Names of what is selected besides it."""
 
 
 def shown_zone(state: AppState, browser: int | None) -> Zone | None:
@@ -39,10 +42,25 @@ def shown_zone(state: AppState, browser: int | None) -> Zone | None:
     return next((zone for zone in zones if zone.name == name), zones[0] if zones else None)
 
 
-def _shown(state: AppState, sender: Sender) -> Zone:
-    zone = shown_zone(state, sender.browser)
+def zones_of(state: AppState, browser: int | None) -> tuple[str, ...]:
+    """Names of all zones that a browser has selected; those that are gone are left out.
+
+    Parameters
+    ----------
+    state : of the page.
+    browser : which one.
+    """
+    shown, names = state.of_browser(browser, ShownZone), [zone.name for zone in state.project.zones]
+    return tuple(name for name in (shown.name, *shown.further) if name in names)
+
+
+def _shown(state: AppState, sender: Sender, called: str = "") -> Zone:
+    """Return the zone that is called so, else the one that is shown."""
+    zone = shown_zone(state.with_browser(sender.browser, ShownZone(called)) if called else state, sender.browser)
     if zone is None:
         raise UsageError("the project has no zone; expected one")
+    if called not in ("", zone.name):
+        raise UsageError(f"no zone is called {called!r}")
     return zone
 
 
@@ -81,11 +99,7 @@ def show_zone(action: actions.ShowZone, state: AppState, sender: Sender) -> Outc
 
 @reduce.register
 def set_zone(action: actions.SetZone, state: AppState, sender: Sender) -> Outcome:
-    if action.of:
-        state = state.with_browser(sender.browser, ShownZone(action.of))
-    zone = _shown(state, sender)
-    if action.of not in ("", zone.name):
-        raise UsageError(f"no zone is called {action.of!r}")
+    zone = _shown(state, sender, action.of)
     changed = with_field(zone, action.field, action.value, "field of a zone")
     what = f"set {WORDS.get(action.field, action.field)} of {zone.name}"
     edit = Edit(f"rename {zone.name}" if action.field == "name" else what, sender)
@@ -94,7 +108,7 @@ def set_zone(action: actions.SetZone, state: AppState, sender: Sender) -> Outcom
 
 @reduce.register
 def count_kind(action: actions.CountKind, state: AppState, sender: Sender) -> Outcome:
-    zone = _shown(state, sender)
+    zone = _shown(state, sender, action.of)
     kinds = tuple(kind for kind in ObservationKind if (action.counts if kind == action.kind else kind in zone.kinds))
     verb = "use" if action.counts else "leave out"
     return _with_zone(state, zone, replace(zone, kinds=kinds), Edit(f"{verb} {action.kind} in {zone.name}", sender))
@@ -102,6 +116,8 @@ def count_kind(action: actions.CountKind, state: AppState, sender: Sender) -> Ou
 
 @reduce.register
 def delete_zone(_action: actions.DeleteZone, state: AppState, sender: Sender) -> Outcome:
-    zone = _shown(state, sender)
-    left = ZONES.remove(state.project.zones, zone.name)
-    return _with_zones(state, left, Edit(f"delete {zone.name}", sender), "")
+    zone, chosen = _shown(state, sender), zones_of(state, sender.browser)
+    gone = chosen if len(chosen) > 1 else (zone.name,)
+    left = tuple(each for each in state.project.zones if each.name not in gone)
+    what = zone.name if len(gone) == 1 else counted_text(len(gone), "zone")
+    return _with_zones(state, left, Edit(f"delete {what}", sender), "")

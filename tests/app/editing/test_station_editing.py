@@ -185,6 +185,7 @@ def test_the_table_lists_routes_and_stations_and_a_row_selects_and_flies(placed:
     assert {name: [row.key for row in content.rows] for name, content in shown.items()} == {
         "routes": [ROUTE],
         "stations": ["Station 1"],
+        "scanners": ["scanner"],
     }
     station = dict(
         zip([each.title for each in shown["stations"].columns], shown["stations"].rows[0].cells, strict=True)

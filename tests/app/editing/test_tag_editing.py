@@ -138,7 +138,7 @@ def test_the_table_lists_tags_and_a_row_selects_and_flies(placed: AppState) -> N
     table = RouteTable(server.gui, lambda _action: None, ME)
     state = after(placed, SetPosed(PosedKind.TAG, "heading", math.pi / 2))
     table.draw_slowly(PageView(state=state))
-    listed = table.tables.shown[-1]
+    listed = next(each for each in table.tables.shown if each.name == "tags")
     assert (listed.name, [each.title for each in listed.columns][:4]) == (
         "tags",
         ["Id", "x [m]", "y [m]", "Heading [°]"],
