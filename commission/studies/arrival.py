@@ -87,7 +87,7 @@ def floor_of(device_ns: IntArray, arrived_ns: IntArray) -> QuickestArrivals | No
     lowest_ns = int(delay_ns.min())
     at = (device_ns - device_ns[0]).astype(np.float64) * 1e-9
     delays = (delay_ns - lowest_ns).astype(np.float64) * 1e-9
-    drift, base = _line_below(at, delays)
+    drift, base = line_below(at, delays)
     if abs(drift) > LARGEST_DRIFT:
         drift, base = 0.0, 0.0
     above = delays - base - drift * at
@@ -180,8 +180,14 @@ def arrival_offset(
     )
 
 
-def _line_below(at: FloatArray, values: FloatArray) -> tuple[float, float]:
-    """Return slope and height at 0 of the line below all points that is nearest to them in the sum."""
+def line_below(at: FloatArray, values: FloatArray) -> tuple[float, float]:
+    """Return slope and height at 0 of the line below all points that is nearest to them in the sum.
+
+    Parameters
+    ----------
+    at : (N,) times, ascending.
+    values : (N,) what is above the line.
+    """
     x, y, hull = at.tolist(), values.tolist(), list[int]()
     for index in range(len(x)):
         if hull and x[index] <= x[hull[-1]]:

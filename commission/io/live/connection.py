@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from commission.errors import DecodeError, SourceError
-from commission.io.live.clocks import DevicePlace, HostClock
+from commission.io.live.clocks import DevicePlaces, HostClock
 from commission.io.live.driver import Driver
 from commission.io.live.links import Link, Opened, Piece
 from commission.io.live.registry import SourceAddress
@@ -237,9 +237,10 @@ class Connection:
         self, message: LiveMessage, arrived_ns: int, talk: _Conversation, deliver: Callable[[Arrival], bool]
     ) -> None:
         """Stamp a record and hand it on, unless it came before."""
-        before = talk.place.begun_again
-        stamp_ns = talk.place.stamp(message.device_ns, arrived_ns)
-        if talk.place.begun_again != before:
+        before, channel = talk.places.begun_again, _channel(message.record)
+        stamp_ns = talk.places.stamp(message.device_ns, arrived_ns, channel)
+        device_ns = self._device_ns(message.device_ns, talk, channel)
+        if talk.places.begun_again != before:
             self._conversations += 1
             talk.number, talk.numbers = self._conversations, Numbers()
             self._tally.forget_times()
@@ -248,19 +249,29 @@ class Connection:
             self._tally.duplicates += 1
             return
         self._tally.lost = max(self._tally.lost + lost, 0)
-        self._tally.arrived(arrived_ns, None if message.device_ns is None else arrived_ns - stamp_ns)
-        kind = _kind(message.record)
-        if kind is not None:
-            self._tally.timed(kind, message.device_ns, arrived_ns)
+        self._tally.arrived(arrived_ns, None if device_ns is None else arrived_ns - stamp_ns)
+        if channel >= ODOMETRY:
+            self._tally.timed(channel, device_ns, arrived_ns)
         if not deliver(Arrival(stamped(message.record, stamp_ns), arrived_ns, talk.number)):
             self._tally.overrun += 1
 
+    def _device_ns(self, device_ns: int | None, talk: _Conversation, channel: int) -> int | None:
+        """Time by the sender's clock [ns]; None where it has none, and told where it says that it has."""
+        if device_ns is not None and talk.places.stands_still(channel):
+            self._told["records have a clock that stands still and are stamped as they arrive"] += 1
+            return None
+        if device_ns is not None and talk.places.several and not talk.is_told:
+            talk.is_told = True
+            self._told["times a sender's records had clocks more than 1 s apart, each placed by when they arrive"] += 1
+        return device_ns
 
-def _kind(record: Sent) -> int | None:
-    """Index of the scanner that a record is of, or ODOMETRY; None of a reference and of a camera's frame."""
+
+def _channel(record: Sent) -> int:
+    """Index of the scanner that a record is of, ODOMETRY, or less of what says nothing of clocks."""
     if isinstance(record, Scan | Detections):
         return record.scanner
-    return None if isinstance(record, ReferencePose | TagSightings | Reflex) else ODOMETRY
+    others = ReferencePose, TagSightings, Reflex
+    return next((ODOMETRY - 1 - number for number, kind in enumerate(others) if isinstance(record, kind)), ODOMETRY)
 
 
 class _Conversation:
@@ -268,4 +279,5 @@ class _Conversation:
 
     def __init__(self, driver: Driver, number: int) -> None:
         self.driver, self.number = driver, number
-        self.numbers, self.place = Numbers(), DevicePlace()
+        self.numbers, self.places = Numbers(), DevicePlaces()
+        self.is_told = False

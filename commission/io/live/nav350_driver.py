@@ -11,6 +11,7 @@ from commission.errors import DecodeError
 from commission.io.live.driver import BaseDriver
 from commission.io.protocols import cola, nav350
 from commission.io.protocols.cola_encoder import frame_binary
+from commission.io.protocols.device_time import Counter32
 from commission.io.protocols.message import LiveMessage
 from commission.site.records import Detections
 
@@ -38,6 +39,7 @@ class NavDriver(BaseDriver):
     def __init__(self, scanners: tuple[str, ...], scanner: int) -> None:
         super().__init__(scanners, scanner)
         self._rest = b""
+        self._counter = Counter32(MILLISECOND)
         self._request = ASK_POSE
         self._is_owed = True
         self._asked_ns: int | None = None
@@ -65,14 +67,16 @@ class NavDriver(BaseDriver):
             raise DecodeError(f"the NAV350 says: {words}; expected one that navigates or detects reflectors", 0)
         scan = nav350.scan_of(result, arrived_ns, scanner=self.scanner)
         if scan is not None:
-            stamp = result.scan_stamp_ms
-            yield LiveMessage(scan, device_ns=None if stamp is None else stamp * MILLISECOND)
+            yield LiveMessage(scan, device_ns=self._time(result.scan_stamp_ms, arrived_ns))
         elif len(result.range_bearing):
             # The device's 0 points to its cable side.
             turned = result.range_bearing - np.array([0.0, math.pi])
-            stamp = result.pose_stamp_ms
             found = Detections(arrived_ns, turned, self.scanner)
-            yield LiveMessage(found, device_ns=None if stamp is None else stamp * MILLISECOND)
+            yield LiveMessage(found, device_ns=self._time(result.pose_stamp_ms, arrived_ns))
+
+    def _time(self, stamp_ms: int | None, arrived_ns: int) -> int | None:
+        """Time by the device's clock [ns]; None where an answer says none."""
+        return None if stamp_ms is None else self._counter.unwrapped(stamp_ms, arrived_ns)
 
     def reply(self, now_ns: int) -> bytes:
         """Ask for the next result, once the one before has come, or nothing has for a second."""

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from commission.io.live.driver import BaseDriver
 from commission.io.protocols import safety
+from commission.io.protocols.device_time import EvenTime
 from commission.io.protocols.message import LiveMessage
 
 
@@ -23,9 +24,10 @@ class SafetyDriver(BaseDriver):
     def __init__(self, scanners: tuple[str, ...], scanner: int) -> None:
         super().__init__(scanners, scanner)
         self._reassembly = safety.Reassembly()
+        self._even = EvenTime()
 
     def take(self, data: bytes, arrived_ns: int) -> Iterator[LiveMessage]:
-        """Deliver the scan that a fragment completes, by the time of arrival: the scanner's clock jitters."""
+        """Deliver the scan that a fragment completes; raises DecodeError."""
         instance = self._reassembly.add(safety.decode_fragment(data))
         found = None if instance is None else safety.decode_instance(instance)
         if found is None:
@@ -35,4 +37,6 @@ class SafetyDriver(BaseDriver):
         if found.glare.any():
             self.told["scans have beams that were blinded"] += 1
         # Every data set of a channel has a number of its own: what is missing between two was lost.
-        yield LiveMessage(safety.scan_of(found, arrived_ns, scanner=self.scanner), sequence=found.sequence)
+        device_ns = None if found.time_ns is None else self._even.of(found.scan_number, found.time_ns)
+        scan = safety.scan_of(found, arrived_ns, scanner=self.scanner)
+        yield LiveMessage(scan, device_ns=device_ns, sequence=found.sequence)

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 
 from commission.errors import DecodeError
 from commission.io.protocols import cola, compact, nav350, safety
+from commission.io.protocols.device_time import Counter32, EvenTime
 from commission.site.records import Scan
 
 MILLISECOND, MICROSECOND = 1_000_000, 1_000
@@ -50,6 +51,10 @@ class ColaAssembly(Assembly):
 
     rest = b""
 
+    def __init__(self, name: str, told: Counter[str]) -> None:
+        super().__init__(name, told)
+        self.counter = Counter32(MICROSECOND)
+
     def found(self, data: bytes, arrived_ns: int) -> Iterator[Timed]:
         """Deliver what a payload completes; raises DecodeError."""
         frames, self.rest = cola.split_frames(self.rest + data)
@@ -57,11 +62,12 @@ class ColaAssembly(Assembly):
         for frame in frames:
             if cola.is_scan(frame):
                 telegram = cola.decode_lmd(frame)
+                begin_ns = self.counter.unwrapped(telegram.begin_us, arrived_ns)
                 if telegram.layer:
                     self.told[f"scans of {self.name} are of layers that are not level and are left out"] += 1
                     continue
                 yield (
-                    telegram.begin_us * MICROSECOND,
+                    begin_ns,
                     arrived_ns,
                     lambda stamp, scanner, found=telegram: cola.scan_of(found, stamp, scanner=scanner),
                 )
@@ -72,13 +78,18 @@ class NavAssembly(Assembly):
 
     rest = b""
 
+    def __init__(self, name: str, told: Counter[str]) -> None:
+        super().__init__(name, told)
+        self.counter = Counter32(MILLISECOND)
+
     def found(self, data: bytes, arrived_ns: int) -> Iterator[Timed]:
         """Deliver what a payload completes; raises DecodeError."""
         frames, self.rest = cola.split_frames(self.rest + data)
         for frame in frames:
             if frame.startswith(NAV_ANSWER):
                 result = nav350.decode_nav(frame)
-                device = None if result.scan_stamp_ms is None else result.scan_stamp_ms * MILLISECOND
+                stamp_ms = result.scan_stamp_ms
+                device = None if stamp_ms is None else self.counter.unwrapped(stamp_ms, arrived_ns)
                 yield (
                     device,
                     arrived_ns,
@@ -87,11 +98,12 @@ class NavAssembly(Assembly):
 
 
 class SafetyAssembly(Assembly):
-    """Instances of a safety scanner, whose own clock jitters: the time of capture stands."""
+    """Instances of a safety scanner, whose clock jitters: times are put in line by the numbers of its scans."""
 
     def __init__(self, name: str, told: Counter[str]) -> None:
         super().__init__(name, told)
         self.reassembly = safety.Reassembly()
+        self.even = EvenTime()
 
     def found(self, data: bytes, arrived_ns: int) -> Iterator[Timed]:
         """Deliver what a payload completes; raises DecodeError."""
@@ -101,7 +113,8 @@ class SafetyAssembly(Assembly):
             self.told[f"scans of {self.name} are left out: a fragment was lost"] += 1
         scan = None if instance is None else safety.decode_instance(instance)
         if scan is not None:
-            yield None, arrived_ns, lambda stamp, scanner: safety.scan_of(scan, stamp, scanner=scanner)
+            device = None if scan.time_ns is None else self.even.of(scan.scan_number, scan.time_ns)
+            yield device, arrived_ns, lambda stamp, scanner: safety.scan_of(scan, stamp, scanner=scanner)
 
 
 class CompactAssembly(Assembly):

@@ -26,6 +26,7 @@ BEAM_LIMIT = 2_751
 """Beams of a scan, the limit of the vendor's driver."""
 OPEN_LIMIT = 8
 """Instances of one scanner that wait for fragments at once; older ones are given up."""
+DAY_MS = 86_400_000
 _DEG = 1.0 / 4_194_304.0
 _INFINITE, _GLARE, _REFLECTOR, _CONTAMINATED, _DIRTY = 2, 4, 8, 16, 32
 
@@ -78,6 +79,11 @@ class SafetyScan:
     """Whether the scanner warns of a dirty window."""
     contamination_error: bool
     """Whether it has switched off because of it."""
+
+    @property
+    def time_ns(self) -> int | None:
+        """Time by the scanner's clock [ns], which jitters; None where it says none."""
+        return (self.days * DAY_MS + self.milliseconds) * 1_000_000 or None
 
     @property
     def glare(self) -> NDArray[np.bool_]:

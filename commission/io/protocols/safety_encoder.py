@@ -7,7 +7,7 @@ import struct
 
 import numpy as np
 
-from commission.io.protocols.safety import MAGIC
+from commission.io.protocols.safety import DAY_MS, MAGIC
 from commission.site.records import Scan
 
 PAYLOAD = 1_436
@@ -39,8 +39,8 @@ def encode_instance(scan: Scan, sequence: int, cycle_ms: int = 40) -> bytes:
     rows["status"] = _VALID | np.where(has_echo, 0, _INFINITE) | np.where(flags & has_echo, _REFLECTOR, 0)
     size = 4 + 4 * beams
     head = struct.pack("<BBBBIIB3x", ord("R"), 1, 0, 0, 1, 1, 0)
-    milliseconds = scan.stamp_ns // 1_000_000
-    head += struct.pack("<IIHHI", sequence % 2**32, sequence % 2**32, 0, 0, milliseconds % 86_400_000)
+    days, milliseconds = divmod(scan.stamp_ns // 1_000_000, DAY_MS)
+    head += struct.pack("<IIHHI", sequence % 2**32, sequence % 2**32, days % 2**16, 0, milliseconds)
     head += struct.pack("<12H", _STATE, 16, _CONFIGURATION, 24, _MEASUREMENT, size, 0, 0, 0, 0, 0, 0).ljust(28, b"\0")
     state = struct.pack("<16x")
     start = round((math.degrees(scan.angle_min) + 90.0) * _DEG)

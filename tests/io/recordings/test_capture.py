@@ -135,6 +135,21 @@ def test_device_clock_takes_the_least_delay_for_none() -> None:
     assert [clock.stamp(1_000, 51_000), clock.stamp(2_000, 50_500), clock.stamp(None, 77)] == [49_500, 50_500, 77]
 
 
+def test_device_clock_follows_drift_and_a_clock_that_begins_again() -> None:
+    rng, clock = np.random.default_rng(8), DeviceClock()
+    true = np.arange(0, 1_200 * 25) * 40_000_000
+    late = rng.integers(0, 100_000_000, len(true))
+    # It is too fast by 80 us in a second, and switched off and on after ten minutes.
+    device = np.round(true * (1.0 + 80e-6)).astype(np.int64) + 10**12
+    device[15_000:] -= device[15_000] - 10**9
+    pairs = list(zip(device.tolist(), (true + late + START).tolist(), strict=True))
+    for at, captured in pairs:
+        clock.learn(at, captured)
+    clock.begin()
+    off = np.array([clock.stamp(at, captured) for at, captured in pairs]) - true - START
+    assert np.abs(off).max() < 2_000_000
+
+
 def test_capture_without_telegrams_says_what_is_read(tmp_path: Path) -> None:
     file = made.write_pcap(tmp_path / "a.pcap", [(START, made.ip(17, made.udp(b"hello")))])
 

@@ -68,4 +68,28 @@ IO = (
         replace='"heading_sigma": "_deg"',
         tests=(TESTS + "test_coverage_files.py::test_files_hold_the_figures_of_the_floor",),
     ),
+    Mutant(
+        name="scans of a safety scanner stamped as they arrive",
+        file=FOLDER + "live/safety_driver.py",
+        find="None if found.time_ns is None else self._even.of(found.scan_number, found.time_ns)",
+        replace="None",
+        tests=(
+            TESTS + "live/test_device_clocks.py"
+            "::test_a_drive_whose_scans_and_odometry_come_late_is_localized_like_one_in_time",
+        ),
+    ),
+    Mutant(
+        name="drift of a device's clock added the wrong way round",
+        file=FOLDER + "live/clocks.py",
+        find="round(drift * (device_ns - at_ns))",
+        replace="round(drift * (at_ns - device_ns))",
+        tests=(TESTS + "live/test_clocks.py::test_a_device_whose_clock_drifts_is_followed",),
+    ),
+    Mutant(
+        name="clock that stands still taken for a clock",
+        file=FOLDER + "live/clocks.py",
+        find="self.is_still = device_ns == self._last_ns and",
+        replace="self.is_still = device_ns > self._last_ns and",
+        tests=(TESTS + "live/test_device_clocks.py::test_a_clock_that_stands_still_is_none",),
+    ),
 )
