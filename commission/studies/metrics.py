@@ -208,9 +208,11 @@ def largest_jump(errors: FloatArray) -> float:
     -------
     jump : [m]; NaN when no two consecutive cycles have a reference.
     """
-    steps = np.hypot(*np.diff(errors[:, :2], axis=0).T)
-    known = steps[np.isfinite(steps)]
-    return float(known.max()) if len(known) else float("nan")
+    largest = -np.inf
+    for first in range(0, len(errors), ROWS_AT_ONCE):
+        steps = np.hypot(*np.diff(errors[first : first + ROWS_AT_ONCE + 1, :2], axis=0).T)
+        largest = max(largest, float(steps.max(initial=-np.inf, where=np.isfinite(steps))))
+    return largest if largest >= 0.0 else float("nan")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -255,25 +257,31 @@ def error_statistics(
     -------
     statistics : None when no cycle has a reference pose.
     """
-    distance = np.hypot(errors[:, 0], errors[:, 1])
-    known = np.isfinite(distance)
+    known = np.isfinite(errors[:, 0]) & np.isfinite(errors[:, 1])
     if not known.any():
         return None
+    # Of hours each column is large: the largest one goes before others come.
+    anees_position, anees = _anees(errors, covariances)
+    distance = np.hypot(errors[:, 0], errors[:, 1])
     distances = distance[known]
-    headings = errors[known, 2]
-    _, position_nees, pose_nees = nees_of_leading(errors, covariances).T
     return ErrorStatistics(
         compared=len(distances),
         position_rmse=float(np.sqrt(np.mean(distances**2))),
         position_median=float(np.median(distances)),
         position_p95=float(np.quantile(distances, 0.95)),
         position_max=float(distances.max()),
-        heading_rmse=float(np.sqrt(_mean_of_known(headings**2))),
-        anees=_mean_of_known(pose_nees) / 3.0,
-        anees_position=_mean_of_known(position_nees) / 2.0,
+        heading_rmse=float(np.sqrt(_mean_of_known(errors[known, 2] ** 2))),
+        anees=anees,
+        anees_position=anees_position,
         largest_jump=largest_jump(errors),
         wrong_while_operational=int(np.count_nonzero(operational & (distance > position_limit))),
     )
+
+
+def _anees(errors: FloatArray, covariances: FloatArray) -> tuple[float, float]:
+    """Mean NEES of the place and of the pose, by their degrees of freedom."""
+    _, position_nees, pose_nees = nees_of_leading(errors, covariances).T
+    return _mean_of_known(position_nees) / 2.0, _mean_of_known(pose_nees) / 3.0
 
 
 def _mean_of_known(values: FloatArray) -> float:

@@ -32,6 +32,7 @@ from commission.studies.consistency import Consistency, Recent, consistency, rec
 from commission.studies.contour_figures import contour_figures
 from commission.studies.inputs import StudyInput
 from commission.studies.metrics import (
+    ROWS_AT_ONCE,
     ErrorStatistics,
     FailEpisode,
     error_statistics,
@@ -275,12 +276,13 @@ def judge(inputs: RunInput, columns: RunColumns, microseconds_per_cycle: float) 
         pending = beside.submit(scanner_figures, columns, references, tallies)
         errors = pose_errors(columns.means, references)
         covariances = _of_places_known(columns, log, references)
-        operational, limits = columns.modes == Mode.OPERATIONAL, limits_along(columns)[:, 0]
-        statistics = error_statistics(errors, covariances, operational, limits)
+        statistics = error_statistics(errors, covariances, columns.modes == Mode.OPERATIONAL, _position_limits(columns))
         scanners = pending.result()
     # Each is a column of the whole run: it goes before the others come.
     del references, covariances
     whole, newest = consistency(columns, tallies=tallies), recent(columns, tallies=tallies)
+    counts, largest_d2 = tallies.counts, tallies.largest_d2
+    del tallies
     first_ns = log.first_ns
     times = np.asarray((columns.stamps_ns - first_ns) * 1e-9, dtype=np.float64)
     return RunResult(
@@ -294,8 +296,8 @@ def judge(inputs: RunInput, columns: RunColumns, microseconds_per_cycle: float) 
         position_two_sigma=read_only(supervised_two_sigma(columns)),
         consistency=whole,
         recent=newest,
-        counts=read_only(tallies.counts),
-        nis=read_only(tallies.largest_d2),
+        counts=read_only(counts),
+        nis=read_only(largest_d2),
         statistics=statistics,
         episodes=fail_episodes(columns.stamps_ns, columns.modes),
         scanners=scanners,
@@ -344,11 +346,18 @@ def two_sigma_of(covariances: FloatArray) -> FloatArray:
 def supervised_two_sigma(columns: RunColumns) -> FloatArray:
     """(K,) 2-sigma of the position [m], in each cycle the one that its supervisor holds against the limit."""
     ends = (*columns.firsts[1:].tolist(), len(columns))
-    stretches = [
-        position_two_sigma(columns.covariances[segment.first : end], segment.setup.parameters.supervisor)
-        for segment, end in zip(columns.segments, ends, strict=True)
-    ]
-    return np.concatenate(stretches)
+    found = np.empty(len(columns))
+    for segment, end in zip(columns.segments, ends, strict=True):
+        for first in range(segment.first, end, ROWS_AT_ONCE):
+            rows = slice(first, min(first + ROWS_AT_ONCE, end))
+            found[rows] = position_two_sigma(columns.covariances[rows], segment.setup.parameters.supervisor)
+    return found
+
+
+def _position_limits(columns: RunColumns) -> float | FloatArray:
+    """Limit of the position [m]; (K,) array where it changes on the way."""
+    limits = {segment.setup.parameters.supervisor.position_limit for segment in columns.segments}
+    return limits.pop() if len(limits) == 1 else limits_along(columns)[:, 0]
 
 
 def limits_along(columns: RunColumns) -> FloatArray:

@@ -223,7 +223,7 @@ def _cycles_of(columns: RunColumns, name: str) -> BoolArray:
 def _figures(name: str, columns: RunColumns, tallies: Tallies, means: FloatArray) -> ScannerFigures:
     """Figures of one scanner; `means` are its residuals against the estimate and against the reference."""
     cycles = _cycles_of(columns, name)
-    counts = tallies.counts[cycles].sum(axis=0, dtype=np.int64)
+    counts = tallies.counts.sum(axis=0, dtype=np.int64, where=cycles[:, np.newaxis])
     accepted = int(counts[Status.INLIER])
     return ScannerFigures(
         name=name,
