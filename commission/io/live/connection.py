@@ -15,8 +15,9 @@ from typing import Protocol
 from commission.errors import DecodeError, SourceError
 from commission.io.live.clocks import DevicePlaces, HostClock
 from commission.io.live.driver import Driver
-from commission.io.live.links import Link, Opened, Piece
+from commission.io.live.links import Link, Opened
 from commission.io.live.registry import SourceAddress
+from commission.io.live.senders import Sender, Senders
 from commission.io.live.sorter import stamped
 from commission.io.live.status import ODOMETRY, Arrivals, Numbers, SourceState, SourceStatus, Tally
 from commission.io.protocols.message import LiveMessage, Sent
@@ -28,8 +29,6 @@ SENDER_LIMIT = 8
 """Senders to one address that are remembered at once."""
 REST_NS = 1_000_000_000
 """Time after the end in which what had arrived is still received [ns]."""
-LET_GO_NS = 1_000_000_000
-"""Time after which another computer may be the scanner that was silent [ns]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +98,7 @@ class Connection:
         self._thread: threading.Thread | None = None
         self._conversations = 0
         self._is_one_scanner = False
-        self._host: tuple[str, int] = "", 0
+        self._senders = Senders(self._told)
         self._opened: Opened | None = None
         self._is_busy = False
         self._end_ns = 0
@@ -188,11 +187,11 @@ class Connection:
                     opened.send(talk.driver.reply(arrived_ns))
                 continue
             self._tally.bytes_received += len(piece.data)
-            if self._is_foreign(piece, arrived_ns):
-                self._told["datagrams of another computer are left out"] += 1
+            # Fragments of two scanners would be taken for those of one.
+            if self._is_one_scanner and not self._senders.takes(0, piece.sender, arrived_ns):
                 continue
             if piece.sender not in conversations:
-                conversations[piece.sender] = self._begun()
+                conversations[piece.sender] = self._begun(piece.sender)
             conversations.move_to_end(piece.sender)
             if len(conversations) > SENDER_LIMIT:
                 conversations.popitem(last=False)
@@ -212,17 +211,7 @@ class Connection:
             return True
         return opened.unread and self._clock.now_ns() < self._end_ns
 
-    def _is_foreign(self, piece: Piece, arrived_ns: int) -> bool:
-        """Whether a datagram is of another computer than the scanner that sends: two would be taken for one."""
-        if piece.sender is None or not self._is_one_scanner:
-            return False
-        host, arrived = self._host
-        if host != piece.sender[0] and host and arrived_ns - arrived < LET_GO_NS:
-            return True
-        self._host = piece.sender[0], arrived_ns
-        return False
-
-    def _begun(self) -> _Conversation:
+    def _begun(self, sender: Sender | None = None) -> _Conversation:
         """Return a conversation with a sender that begins."""
         driver = self._make()
         # Of all conversations, one count.
@@ -231,13 +220,15 @@ class Connection:
         self._conversations += 1
         self._tally.connects += 1
         self._tally.forget_times()
-        return _Conversation(driver, self._conversations)
+        return _Conversation(driver, self._conversations, sender)
 
     def _deliver(
         self, message: LiveMessage, arrived_ns: int, talk: _Conversation, deliver: Callable[[Arrival], bool]
     ) -> None:
         """Stamp a record and hand it on, unless it came before."""
         before, channel = talk.places.begun_again, _channel(message.record)
+        if not self._is_one_scanner and not self._senders.takes(channel, talk.sender, arrived_ns):
+            return
         stamp_ns = talk.places.stamp(message.device_ns, arrived_ns, channel)
         device_ns = self._device_ns(message.device_ns, talk, channel)
         if talk.places.begun_again != before:
@@ -277,7 +268,7 @@ def _channel(record: Sent) -> int:
 class _Conversation:
     """One sender, from when it began."""
 
-    def __init__(self, driver: Driver, number: int) -> None:
-        self.driver, self.number = driver, number
+    def __init__(self, driver: Driver, number: int, sender: Sender | None) -> None:
+        self.driver, self.number, self.sender = driver, number, sender
         self.numbers, self.places = Numbers(), DevicePlaces()
         self.is_told = False
