@@ -135,7 +135,7 @@ def process_reflex(  # noqa: PLR0917 - outputs are written into the arrays of th
     evidence = weigh_lasting(evidence, stamp_ns, prior, figures[row], named, reflexes, places, twist, model.consider)
     figures[row, LASTING] = 1.0 if evidence.lasting else 0.0
     pivot = state.pivot if cross is None else (belief.x, belief.y)
-    after = supervised(state, stamp_ns, belief, motion, evidence, pivot, model)
+    after = supervised(state, stamp_ns, belief, motion, evidence, pivot, state.walls, model)
     return Cycle(prior, held_back(rivals, state, after, model))
 
 

@@ -37,6 +37,7 @@ from commission.localization.odometry import Motion, NextOdometry, trend, veloci
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.pose_rows import PoseRows, correct_all_by_rows, nis_of_rows, told_directions
 from commission.localization.sweep import Sweep
+from commission.localization.wall_depth import WallDepth, deepened, learned
 from commission.site.floor_map import FloorMap
 from commission.site.parameters import ContourParameters
 from commission.site.scanner import Scanner
@@ -73,8 +74,9 @@ class ContourUse(IntEnum):
 ACCEPTED, REJECTED, UNMATCHED = int(ContourUse.ACCEPTED), int(ContourUse.REJECTED), int(ContourUse.UNMATCHED)
 CONTRADICTED = int(ContourUse.CONTRADICTED)
 USE, POINTS, MATCHED, THRESHOLD, COST, NIS, ROWS, MATCH_X, MATCH_Y, MATCH_THETA, ITERATIONS, SIGMA = range(12)
+DEPTH, LEARNED_DEPTH, LEARNED_INFORMATION = 12, 13, 14
 """Columns of what is known of a scan's contours; `contour_figures` names them."""
-COLUMNS = 12
+COLUMNS = 15
 WHOLE_POSE = 3
 """Rows of a match that tells place and heading."""
 
@@ -91,6 +93,8 @@ class ContourModel(NamedTuple):
     map_position: float
     """Variance of the map's error, along x and along y [m^2]."""
     map_heading: float
+    depth_variance: float
+    """Of how far behind the drawn faces beams end, before any scan [m^2]."""
     map_per_metre: float
     """One divided by the way over which the map's error is the same [1/m]."""
     limits: FloatArray
@@ -141,6 +145,7 @@ def contour_model(floor: FloorMap | None, scanners: Sequence[Scanner], given: Co
         (one, two, three),
         given.map_sigma**2,
         given.map_heading_sigma**2,
+        given.depth_sigma**2,
         1.0 / given.map_correlation,
         *what_is_no_echo(scanners),
     )
@@ -294,6 +299,7 @@ def observe_contours(  # noqa: PLR0917 - the filter's state around one scan
     motion: Motion,
     following: NextOdometry,
     moved: float,
+    walls: WallDepth,
     reflectors: int,
     variances: ConsiderModel,
     cross: FloatArray | None,
@@ -311,6 +317,7 @@ def observe_contours(  # noqa: PLR0917 - the filter's state around one scan
     model : of the contours.
     motion, following : odometry before the scan and after it.
     moved : way since the scan before [m]: the map's error changes along it.
+    walls : how deep they are known to be.
     reflectors : N of the reflector map.
     variances : of the constants of the scanner.
     cross : (3, 2 N + 5 S + 3) covariance of the pose with the constants at `belief`, written in place, or None: the
@@ -350,12 +357,13 @@ def observe_contours(  # noqa: PLR0917 - the filter's state around one scan
         math.sqrt(belief.tt),
     )
     believed = to_grid(belief, model.tables)
-    start = best_start(believed, spread, lever, points, model.tables, model.rule)
-    found = match(start, lever, points, model.tables, model.rule)
-    rows = rows_of_match(belief, found.pose, found.threshold, lever, points, model, figures)
-    figures[ITERATIONS] = found.iterations
+    tables = deepened(model.tables, walls.depth)
+    start = best_start(believed, spread, lever, points, tables, model.rule)
+    found = match(start, lever, points, tables, model.rule)
+    rows = rows_of_match(belief, found.pose, found.threshold, lever, points, tables, model, figures)
+    figures[ITERATIONS], figures[DEPTH] = found.iterations, walls.depth
     told = len(rows.residuals) if figures[MATCHED] >= model.least_matched * count else 0
-    if told < WHOLE_POSE:
+    if told == 0 or (told < WHOLE_POSE and not lost):
         # A single wall fits many places: what else is seen has to fit as well.
         x, y = scan.observation.mount_x / resolution, scan.observation.mount_y / resolution
         if share_through_walls(believed, points, x, y, model.tables) > MOST_THROUGH:
@@ -390,6 +398,9 @@ def observe_contours(  # noqa: PLR0917 - the filter's state around one scan
         figures[USE] = REJECTED
         return belief
     figures[USE] = ACCEPTED
+    figures[LEARNED_DEPTH], figures[LEARNED_INFORMATION] = learned(
+        walls, model.depth_variance, moved, found.pose, lever, points, tables, model.rule.length
+    )
     stretches = (first, PER_SCANNER), (last, PER_MAP)
     return correct_all_by_rows(belief, columns, considered, rows, stretches, cross, busy, invariant)
 
@@ -415,6 +426,7 @@ def rows_of_match(  # noqa: PLR0917 - a match and its points
     threshold: float,
     lever: float,
     points: FloatArray,
+    tables: ContourTables,
     model: ContourModel,
     figures: FloatArray,
 ) -> PoseRows:
@@ -427,6 +439,7 @@ def rows_of_match(  # noqa: PLR0917 - a match and its points
     threshold : of matched points [m].
     lever : cells that a radian counts for.
     points : (n, 2) points of the scan [cells], base frame.
+    tables : that they were matched with.
     model : of the contours.
     figures : written: points, cost, and the pose.
 
@@ -436,7 +449,7 @@ def rows_of_match(  # noqa: PLR0917 - a match and its points
     second derivative (Sobreira et al. 2015, section 3) but for the curvature of the distance itself, scaled so that it
     is that of d^2 / (2 s^2) near 0; s is the noise of a beam, or what the matched points show where that is more.
     """
-    resolution, length, tables = model.tables.resolution, model.rule.length, model.tables
+    resolution, length = tables.resolution, model.rule.length
     at = information_of(pose, lever, points, tables, length, threshold)
     # Of d alone: what a matched point is off, from the cost of a cost function so wide that it is quadratic.
     wide = cost_of(pose, lever, points, tables, FLAT, threshold, False)

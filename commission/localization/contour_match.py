@@ -131,7 +131,8 @@ def cost_of(  # noqa: PLR0917 - a pose and the points, number by number
     for i in range(len(points)):
         px, py = points[i, 0], points[i, 1]
         ax, ay = c * px - s * py, s * px + c * py
-        d, jx, jy = read_distance(tables.distances, pose.u + ax, pose.v + ay)
+        drawn, jx, jy = read_distance(tables.distances, pose.u + ax, pose.v + ay)
+        d = drawn + tables.depth
         if not abs(d) <= threshold:
             total += beyond
             continue
@@ -177,7 +178,7 @@ def information_of(  # noqa: PLR0917 - a pose and the points, number by number
     for i in range(len(points)):
         px, py = points[i, 0], points[i, 1]
         ax, ay = c * px - s * py, s * px + c * py
-        d = read_distance(tables.distances, pose.u + ax, pose.v + ay).distance
+        d = read_distance(tables.distances, pose.u + ax, pose.v + ay).distance + tables.depth
         if not abs(d) <= threshold:
             continue
         short = max(1.0 - CLEAR / max(math.sqrt(px * px + py * py), 1e-9), 0.0)
@@ -293,12 +294,13 @@ def facing_cost(pose: GridPose, points: FloatArray, tables: ContourTables, lengt
     for i in range(len(points)):
         px, py = points[i, 0], points[i, 1]
         ax, ay = c * px - s * py, s * px + c * py
-        d = read_distance(tables.distances, pose.u + ax, pose.v + ay).distance
+        d = read_distance(tables.distances, pose.u + ax, pose.v + ay).distance + tables.depth
         if not abs(d) <= threshold:
             total += beyond
             continue
         short = max(1.0 - 1.0 / max(math.sqrt(px * px + py * py), 1.0), 0.0)
-        comes_through = read_distance(tables.distances, pose.u + short * ax, pose.v + short * ay).distance < d
+        before = read_distance(tables.distances, pose.u + short * ax, pose.v + short * ay).distance + tables.depth
+        comes_through = before < d
         total += beyond if comes_through else 1.0 - l2 / (l2 + d * d)
     return total
 
@@ -488,7 +490,8 @@ def histogram_threshold(pose: GridPose, points: FloatArray, tables: ContourTable
     per_bin = BINS / rule.largest_error
     for i in range(len(points)):
         px, py = points[i, 0], points[i, 1]
-        d = abs(read_distance(tables.distances, pose.u + c * px - s * py, pose.v + s * px + c * py).distance)
+        drawn = read_distance(tables.distances, pose.u + c * px - s * py, pose.v + s * px + c * py).distance
+        d = abs(drawn + tables.depth)
         if d < rule.largest_error:
             counts[int(d * per_bin)] += 1.0
     highest = 0

@@ -34,6 +34,8 @@ class ContourTables(NamedTuple):
     """`T_grid_map`: pose of the map in the frame of the table [m, m, rad]."""
     y: float
     theta: float
+    depth: float = 0.0
+    """How far behind the drawn faces contours lie [m]: what `read_distance` reads is less by it."""
 
 
 class Reading(NamedTuple):

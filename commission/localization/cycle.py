@@ -21,6 +21,8 @@ from commission.localization.consider_columns import busy_chunks, put_back, put_
 from commission.localization.contour import (
     ACCEPTED,
     CONTRADICTED,
+    LEARNED_DEPTH,
+    LEARNED_INFORMATION,
     REJECTED,
     ROWS,
     USE,
@@ -43,6 +45,7 @@ from commission.localization.state import FilterState
 from commission.localization.supervisor import FAIL, LOST, OPERATIONAL, supervise
 from commission.localization.temporary import TemporaryModel, observe_temporary
 from commission.localization.temporary_memory import TemporaryMemory
+from commission.localization.wall_depth import WallDepth
 from commission.localization.zones import ZoneRows, kinds_at
 
 LOST_DRIFT, LOST_TURN = 0.15, 0.08
@@ -88,6 +91,7 @@ def process_odometry(  # noqa: PLR0917 - one odometry record, number by number
         state.temporary,
         state.rivals,
         state.lasting,
+        state.walls,
     )
 
 
@@ -225,7 +229,7 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
         model.rejection,
     )
     keep_own(rivals, posterior, said_by_contours(figures) == 1.0)
-    after = supervised(state, stamp_ns, posterior, motion, evidence, pivot, model)
+    after = supervised(state, stamp_ns, posterior, motion, evidence, pivot, walls_after(state.walls, figures), model)
     return Cycle(prior, held_back(rivals, state, after, model))
 
 
@@ -258,6 +262,7 @@ def supervised(  # noqa: PLR0917 - what a cycle has found, value by value
     motion: Motion,
     evidence: Evidence,
     pivot: tuple[float, float],
+    walls: WallDepth,
     model: FilterModel,
 ) -> FilterState:
     """State after a cycle, whatever kind of observation it was.
@@ -269,6 +274,7 @@ def supervised(  # noqa: PLR0917 - what a cycle has found, value by value
     posterior, motion : belief after all corrections, and motion up to the stamp.
     evidence : what was accepted and rejected of late, this cycle included.
     pivot : where `cross` is about [m].
+    walls : what is known of them, this cycle included.
     model : of the whole filter.
 
     Notes
@@ -302,6 +308,7 @@ def supervised(  # noqa: PLR0917 - what a cycle has found, value by value
         before.temporary,
         before.rivals,
         before.lasting,
+        walls,
     )
 
 
@@ -338,6 +345,7 @@ def with_mode(before: FilterState, after: FilterState, mode: int) -> FilterState
         after.temporary,
         after.rivals,
         after.lasting,
+        after.walls,
     )
 
 
@@ -415,6 +423,7 @@ def with_contours(  # noqa: PLR0917 - the filter's state around one scan
         motion,
         following,
         moved,
+        before.walls,
         reflectors,
         model.consider,
         cross,
@@ -605,3 +614,21 @@ def _earlier(i: int, first: int, status: NDArray[np.int8], entries: IntArray) ->
         if status[other] == INLIER and entries[other] == entries[i]:
             found = other
     return found
+
+
+@compiled_inline
+def walls_after(before: WallDepth, figures: FloatArray | None) -> WallDepth:
+    """What is known of the walls' depth after a scan.
+
+    Parameters
+    ----------
+    before : what was known.
+    figures : of the scan's contours, or None.
+
+    Notes
+    -----
+    No formula: an accepted scan has told, see `wall_depth.learned`.
+    """
+    if figures is None or figures[USE] != ACCEPTED:
+        return before
+    return WallDepth(figures[LEARNED_DEPTH], figures[LEARNED_INFORMATION])

@@ -83,7 +83,7 @@ class RunColumns:
     d2: FloatArray
     """(n,) squared Mahalanobis distance to that reflector; NaN: none."""
     contours: FloatArray
-    """(K, 12) what became of the contours of each cycle, see `contour`; (0, 12) where they are not looked at."""
+    """(K, 15) what became of the contours of each cycle, see `contour`; (0, 15) where they are not looked at."""
     tags: FloatArray
     """(m, 6) what became of each sighting of a tag, see `tags`; (0, 6) where they are not looked at."""
     bearings: FloatArray

@@ -72,7 +72,7 @@ class Columns(NamedTuple):
     settled: FloatArray
     """(n, 2) detections at the stamp of their scan, upright; (0, 2) where they are what was measured."""
     contours: FloatArray
-    """(K, 12) what became of the contours of each cycle, see `contour`; (0, 12) where they are not looked at."""
+    """(K, 15) what became of the contours of each cycle, see `contour`; (0, 15) where they are not looked at."""
     tags: FloatArray
     """(m, 6) what became of each sighting of a tag, see `tags`; (0, 6) where they are not looked at."""
     levels: FloatArray

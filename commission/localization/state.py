@@ -18,6 +18,7 @@ from commission.localization.rejection import NO_EVIDENCE, Evidence
 from commission.localization.rival_poses import KeptPoses
 from commission.localization.search_state import Search, new_search
 from commission.localization.temporary_memory import TemporaryLandmarks
+from commission.localization.wall_depth import AS_DRAWN, WallDepth
 
 NO_RECORD_NS = -(2**63)
 """Stamp of the newest record before there is one: no stamp is older [ns]."""
@@ -58,6 +59,8 @@ class FilterState(NamedTuple):
     """Where the vehicle may stand as well; None: not begun, or scans are decided on one by one, and in kernels."""
     lasting: LastingInnovations | None = None
     """Mean innovations of bearings; None: there are none, and in kernels."""
+    walls: WallDepth = AS_DRAWN
+    """How far behind the faces that the floor map draws beams end."""
 
 
 def state_at_start(initial: Belief) -> FilterState:

@@ -129,7 +129,7 @@ def process_tags(  # noqa: PLR0917 - outputs are written into the arrays of the 
     pivot = state.pivot if cross is None else (belief.x, belief.y)
     if said_by_tags(figures, first, last) == 1.0:
         forget(rivals)
-    after = supervised(state, stamp_ns, belief, motion, evidence, pivot, model)
+    after = supervised(state, stamp_ns, belief, motion, evidence, pivot, state.walls, model)
     return Cycle(prior, held_back(rivals, state, after, model))
 
 

@@ -240,9 +240,8 @@ def _information(  # noqa: PLR0917 - a point, its beams, and who sees them
         if n * weight < FEWEST_POINTS:
             continue
         points = ends[:n]
-        rows = rows_of_match(
-            pose, to_grid(pose, model.tables), model.rule.largest_error, lever_of(points), points, model, figures
-        )
+        tables, farthest = model.tables, model.rule.largest_error
+        rows = rows_of_match(pose, to_grid(pose, tables), farthest, lever_of(points), points, tables, model, figures)
         if figures[MATCHED] < model.least_matched * n:
             continue
         count += figures[MATCHED] * weight

@@ -306,6 +306,14 @@ class ContourParameters:
         float, Quantity(label="Map alike over", unit="m", bounds=POSITIVE, step=0.5, slider=(0.5, 100.0))
     ] = 5.0
     """Way over which the map's error stays alike: after it, what is left of it is a third."""
+    depth_sigma: Annotated[
+        float,
+        Quantity(
+            label="Drawn thick 1σ", unit="m", shown=MILLIMETRES, bounds=NOT_NEGATIVE, step=1.0, slider=(0.0, 150.0)
+        ),
+    ] = 0.05
+    """How thick the map may draw its walls: 1-sigma of how far behind the drawn faces beams end. A map that scans have
+    drawn does so; it is learned while driving. 0: faces are where beams end."""
     least_matched: Annotated[
         float, Quantity(label="Matched at least", shown=PERCENT, bounds=SHARE, step=1.0, slider=(0.0, 100.0))
     ] = 0.3

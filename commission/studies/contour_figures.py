@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from commission.localization.contour import COST, MATCHED, NIS, POINTS, ROWS, USE, ContourUse
+from commission.localization.contour import COST, LEARNED_DEPTH, MATCHED, NIS, POINTS, ROWS, USE, ContourUse
 from commission.localization.run_columns import RunColumns
 from commission.studies.plausibility import Finding
 
@@ -17,7 +17,8 @@ def contour_figures(columns: RunColumns) -> dict[str, Number]:
     Returns
     -------
     entries : cycles by what became of their contours; share of the beams that were matched and mean cost of a beam
-        [0..1] in the cycles that looked at them; mean NIS of a row of accepted matches, 1 where all is as believed.
+        [0..1] in the cycles that looked at them; mean NIS of a row of accepted matches, 1 where all is as believed;
+        how far behind the drawn walls beams end [m], as it was known at the end.
     """
     figures = columns.contours
     if not len(figures):
@@ -33,6 +34,7 @@ def contour_figures(columns: RunColumns) -> dict[str, Number]:
         "contour_matched_fraction": float(looked[:, MATCHED].sum()) / beams if beams else None,
         "contour_cost_mean": float(looked[:, COST].mean()) if len(looked) else None,
         "contour_nis_per_row_mean": float(accepted[:, NIS].sum()) / rows if rows else None,
+        "contour_depth": float(accepted[-1, LEARNED_DEPTH]) if len(accepted) else None,
     }
 
 

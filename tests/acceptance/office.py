@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
+from scipy.ndimage import binary_dilation, gaussian_filter1d
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 
@@ -124,6 +124,31 @@ def map_of_others(floor: FloorMap, rng: np.random.Generator) -> FloorMap:
     aside = np.roll(walls, rng.integers(-1, 2), axis=rng.integers(0, 2))
     cells[aside & (rng.random(walls.shape) < 0.15)] = OCCUPIED
     return FloorMap(cells, CELL, floor.origin)
+
+
+def map_of_scans(floor: FloorMap, poses: np.ndarray, seed: int, *, cell: float = 0.05) -> FloorMap:
+    """The hall as scans of a robot have drawn it, its poses good to 3 cm and 0.3 degrees: walls are bands of cells."""
+    rng, caster = np.random.default_rng(1000 + seed), RayCaster(floor.occupancy())
+    rows, columns = (int(size * floor.resolution / cell) for size in floor.cells.shape)
+    met = np.zeros((rows, columns), dtype=np.int64)
+    bearings = np.radians(np.arange(-90.0, 90.01, 0.5))
+    for pose in poses[::2]:
+        rays = np.column_stack((np.full(len(bearings), pose[0]), np.full(len(bearings), pose[1]), pose[2] + bearings))
+        ranges = caster.cast(rays, LASER.range[1]) + BEAM_SIGMA * rng.standard_normal(len(bearings))
+        taken_for = pose + np.array((0.03, 0.03, 0.005)) * rng.standard_normal(3)
+        back = np.isfinite(ranges)
+        along = taken_for[2] + bearings[back]
+        ends = taken_for[:2] + ranges[back, None] * np.column_stack((np.cos(along), np.sin(along)))
+        at = np.floor(se2.transform_points(se2.inverse(floor.origin), ends) / cell).astype(int)
+        at = at[((at >= 0) & (at < (columns, rows))).all(axis=1)]
+        np.add.at(met, (at[:, 1], at[:, 0]), 1)
+    return FloorMap(np.where(met >= 3, OCCUPIED, FREE).astype(floor.cells.dtype), cell, floor.origin)
+
+
+def map_with_thick_walls(floor: FloorMap) -> FloorMap:
+    """The hall, its walls drawn one cell too thick to all sides."""
+    thick = np.where(binary_dilation(floor.cells == OCCUPIED, np.ones((3, 3))), OCCUPIED, floor.cells)
+    return FloorMap(thick.astype(floor.cells.dtype), floor.resolution, floor.origin)
 
 
 def drive(floor: FloorMap, seed: int, metres: float = 60.0) -> Office:

@@ -78,6 +78,7 @@ PARAMETERS = {
     "contour.map_sigma": ("Map 1σ [mm]", 1000.0),
     "contour.map_heading_sigma": ("Map turned 1σ [°]", DEGREES),
     "contour.map_correlation": ("Map alike over [m]", 1.0),
+    "contour.depth_sigma": ("Drawn thick 1σ [mm]", 1e3),
     "contour.least_matched": ("Matched at least [%]", 100.0),
     "contour.least_share": ("Direction told by [%]", 100.0),
     "contour.gate_probability": ("Accepted to [%]", 100.0),

@@ -14,6 +14,7 @@ from commission.geometry import se2
 from commission.localization.consider import ConsiderModel
 from commission.localization.contour import (
     ACCEPTED,
+    COLUMNS,
     MATCHED,
     NIS,
     POINTS,
@@ -37,6 +38,7 @@ from commission.localization.pose_rows import PoseRows, corrected_by_rows, nis_o
 from commission.localization.run_columns import RunSegment
 from commission.localization.setup import LocalizerSetup
 from commission.localization.sweep import AT_ONCE, sweep_of
+from commission.localization.wall_depth import AS_DRAWN
 from commission.localization.whole_run import run, run_segments, state_before
 from commission.simulation.scenario import start_of, virtual_drive
 from commission.site.floor_map import FloorMap
@@ -69,7 +71,7 @@ def belief_at(pose, sigmas) -> PoseGaussian:
     return from_belief(Belief(0, np.array(pose, dtype=np.float64), np.diag(np.square(sigmas))))
 
 
-def observed(floor: FloorMap, belief: PoseGaussian, ranges, *, given=EXACT, cross=None):
+def observed(floor: FloorMap, belief: PoseGaussian, ranges, *, given=EXACT, cross=None, walls=AS_DRAWN):
     """What one scan of a full turn at the base makes of a belief, and the figures."""
     model = modelled(floor, (FULL_TURN,), given)
     scan = ContourScan(
@@ -80,9 +82,9 @@ def observed(floor: FloorMap, belief: PoseGaussian, ranges, *, given=EXACT, cros
         ObservationModel(0.0, 0.0, 0.0, 1.0, 1.0, 0.0),
         AT_ONCE,
     )
-    figures, busy = np.zeros(12), None if cross is None else np.zeros(1, np.int64)
+    figures, busy = np.zeros(COLUMNS), None if cross is None else np.zeros(1, np.int64)
     after = observe_contours(
-        belief, scan, model, AT_REST, NOT_YET, 0.0, 0, NOTHING_KNOWN, cross, busy, figures, False, False
+        belief, scan, model, AT_REST, NOT_YET, 0.0, walls, 0, NOTHING_KNOWN, cross, busy, figures, False, False
     )
     return after, figures
 
@@ -327,7 +329,7 @@ def test_contours_switched_on_along_the_way_count_from_there_on():
     initial, on = Belief(0, start.pose, np.diag(start.sigmas**2)), LocalizerSetup.of(project)
     off = dataclasses.replace(on, parameters=Parameters())
     plain = run(log, off, initial)
-    assert plain.contours.shape == (0, 12)
+    assert plain.contours.shape == (0, COLUMNS)
     assert plain.estimate(3).contours is None
     mixed = run_segments(log, (RunSegment(0, off), RunSegment(20, on)), initial, earlier=plain)
     assert mixed.means[:20].tobytes() == plain.means[:20].tobytes()

@@ -8,20 +8,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from commission.localization.contour import COST, MATCHED, NIS, POINTS, ROWS, USE, ContourUse
+from commission.localization.contour import COLUMNS, COST, LEARNED_DEPTH, MATCHED, NIS, POINTS, ROWS, USE, ContourUse
 from commission.studies.contour_figures import contour_figures, contour_findings
 
 
 def columns_of(*rows) -> Any:
-    figures = np.zeros((len(rows), 12))
+    figures = np.zeros((len(rows), COLUMNS))
     for row, (use, points, matched, cost, nis, count) in zip(figures, rows, strict=True):
         row[[USE, POINTS, MATCHED, COST, NIS, ROWS]] = use, points, matched, cost, nis, count
     return SimpleNamespace(contours=figures)
 
 
 def test_figures_are_those_counted_by_hand():
-    found = contour_figures(
-        columns_of(
+    columns = columns_of(
+        *(
             (ContourUse.NONE, 5, 0, 0.0, 0.0, 0),
             (ContourUse.ACCEPTED, 100, 80, 0.1, 2.0, 3),
             (ContourUse.ACCEPTED, 100, 60, 0.2, 3.0, 2),
@@ -30,6 +30,8 @@ def test_figures_are_those_counted_by_hand():
             (ContourUse.CONTRADICTED, 100, 55, 0.35, 0.0, 0),
         )
     )
+    columns.contours[1:3, LEARNED_DEPTH] = 0.01, 0.02
+    found = contour_figures(columns)
     assert found == {
         "contour_accepted": 2,
         "contour_rejected": 1,
@@ -38,6 +40,7 @@ def test_figures_are_those_counted_by_hand():
         "contour_matched_fraction": pytest.approx(0.55),
         "contour_cost_mean": pytest.approx(0.35),
         "contour_nis_per_row_mean": pytest.approx(1.0),
+        "contour_depth": 0.02,
     }
 
 
@@ -50,6 +53,7 @@ def test_a_run_that_never_looked_has_counts_and_no_means():
     assert found["contour_accepted"] == 0
     assert found["contour_matched_fraction"] is None
     assert found["contour_nis_per_row_mean"] is None
+    assert found["contour_depth"] is None
 
 
 @pytest.mark.parametrize(

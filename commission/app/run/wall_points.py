@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from commission.geometry.arrays import FloatArray
-from commission.localization.contour import COST, MATCHED, NIS, POINTS, ROWS, THRESHOLD, USE, ContourUse
+from commission.localization.contour import COST, DEPTH, MATCHED, NIS, POINTS, ROWS, THRESHOLD, USE, ContourUse
 from commission.localization.contour_tables import distances_at
 from commission.localization.run_columns import RunColumns
 from commission.localization.setup import LocalizerSetup
@@ -54,7 +54,7 @@ def wall_points(columns: RunColumns, lived: int, points: FloatArray, setup: Loca
         return None
     figures = columns.contours[begin + int(some[-1])]
     with np.errstate(invalid="ignore"):
-        near = np.abs(distances_at(setup.contour.tables, points)) <= figures[THRESHOLD]
+        near = np.abs(distances_at(setup.contour.tables, points) + figures[DEPTH]) <= figures[THRESHOLD]
     return WallPoints(points[near], points[~near], figures)
 
 
@@ -75,4 +75,5 @@ def walls_told(walls: WallPoints | None) -> list[tuple[str, str]]:
         ("Contours", SAID[ContourUse(int(figures[USE]))] + nis),
         ("Beams on walls", f"{matched:.0f} of {beams:.0f} ({share}), within {MILLIMETRES.text(figures[THRESHOLD])}"),
         ("Cost of each beam", f"{figures[COST]:.3f} (0 on a wall, 1 far off)"),
+        ("Beams end", f"{MILLIMETRES.text(figures[DEPTH])} behind the drawn walls"),
     ]

@@ -43,9 +43,23 @@ LOCALIZATION = (
     Mutant(
         name="a match of contours is held by the far face of a thin wall",
         file=FOLDER + "contour_match.py",
-        find="comes_through = read_distance(",
-        replace="comes_through = -read_distance(",
+        find="comes_through = before < d",
+        replace="comes_through = before > d",
         tests=(TESTS + "test_contour_match.py::test_the_far_face_of_a_thin_wall_holds_no_match",),
+    ),
+    Mutant(
+        name="walls are matched as drawn, however deep they are known to be",
+        file=FOLDER + "wall_depth.py",
+        find="tables.theta, depth)",
+        replace="tables.theta, 0.0)",
+        tests=(TESTS + "test_wall_depth.py::test_a_scan_is_matched_with_walls_as_deep_as_they_are_known_to_be",),
+    ),
+    Mutant(
+        name="the depth of walls is learned again from every scan of a vehicle that stands",
+        file=FOLDER + "wall_depth.py",
+        find="min(moved / NEW_WALLS_AFTER, 1.0)",
+        replace="1.0",
+        tests=(TESTS + "test_wall_depth.py::test_a_vehicle_that_stands_learns_from_its_first_scan_alone",),
     ),
     Mutant(
         name="poses that go along are carried in the direction in which the run's own one drives",
