@@ -9,11 +9,10 @@ import pytest
 
 from commission.app.base.actions import Envelope, Sender
 from commission.app.editing.actions import SelectReflectors
-from commission.app.run.actions import Play, Seek, VirtualDrive
 from commission.app.run.association_panel import NEXT, associated, detected_ids
 from tests.app.sites import room
 from tests.browser.page import SMALL, OpenPage
-from tests.browser.serving import Served
+from tests.browser.serving import Served, standing_drive
 
 LEAST_PX = 9
 """Height of letters that can still be read."""
@@ -32,18 +31,8 @@ SMALL_OR_CUT = f"""() => {{
 
 @pytest.fixture(scope="module")
 def served() -> Iterator[Served]:
-    project = room()
-    opened = Served(project, source=VirtualDrive(project.routes[0].name))
-    opened.until(lambda: opened.view is not None)
-    opened.runtime.post(Play(playing=False))
-    at(opened, 6.0)
-    yield opened
-    opened.close()
-
-
-def at(served: Served, seconds: float) -> None:
-    served.runtime.post(Seek(seconds))
-    served.until(lambda: served.view is not None and served.view.time == pytest.approx(seconds))
+    with standing_drive(room(), at=6.0) as opened:
+        yield opened
 
 
 def wait_for(page: OpenPage, reflector: str) -> None:
@@ -107,7 +96,7 @@ def test_scene_and_numbers_are_of_the_scan_at_the_cursor_and_a_hidden_view_comes
     for seconds in (3.0, 5.0):
         page.open_tab("Layers")
         page.page.wait_for_selector(".c-a-picture", state="hidden")
-        at(served, seconds)
+        served.seek(seconds)
         page.open_tab("Association")
         run = served.view
         assert run is not None

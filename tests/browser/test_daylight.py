@@ -10,21 +10,16 @@ import pytest
 from PIL import Image
 
 from commission.app.base.paints import Color, Floor
-from commission.app.run.actions import Play, VirtualDrive
 from tests.app.base.test_theme import contrast
 from tests.app.sites import room
 from tests.browser.page import OpenPage
-from tests.browser.serving import Served
+from tests.browser.serving import Served, standing_drive
 
 
 @pytest.fixture(scope="module")
 def served() -> Iterator[Served]:
-    project = room()
-    opened = Served(project, source=VirtualDrive(project.routes[0].name))
-    opened.until(lambda: opened.view is not None)
-    opened.runtime.post(Play(playing=False))
-    yield opened
-    opened.close()
+    with standing_drive(room()) as opened:
+        yield opened
 
 
 def share_of(picture: Path, color: Color) -> float:

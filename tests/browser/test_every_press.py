@@ -6,10 +6,9 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from commission.app.run.actions import Play, Seek, VirtualDrive
 from tests.app.sites import room
 from tests.browser.page import OpenPage
-from tests.browser.serving import Served
+from tests.browser.serving import Served, standing_drive
 
 AT_ONCE = """async (places) => {
   const canvas = window.__viserMutable.canvas;
@@ -30,13 +29,8 @@ PRESSED = """async ([name, count]) => {
 
 @pytest.fixture(scope="module")
 def served() -> Iterator[Served]:
-    project = room()
-    opened = Served(project, source=VirtualDrive(project.routes[0].name))
-    opened.until(lambda: opened.view is not None)
-    opened.runtime.post(Play(playing=False))
-    opened.runtime.post(Seek(4.0))
-    yield opened
-    opened.close()
+    with standing_drive(room(), at=4.0) as opened:
+        yield opened
 
 
 @pytest.fixture(scope="module")

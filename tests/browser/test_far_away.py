@@ -10,10 +10,9 @@ from PIL import Image
 from playwright.sync_api import Page
 
 from commission.app.base import theme
-from commission.app.run.actions import Play, Seek, VirtualDrive
 from tests.app.sites import moved, room
 from tests.browser.page import OpenPage
-from tests.browser.serving import Served
+from tests.browser.serving import standing_drive
 from tests.browser.test_marks import pixels_of
 
 GRID = (456_000.0, 5_712_345.0)
@@ -30,11 +29,7 @@ def floor(page: Page) -> np.ndarray:
 def seen_at(window: Callable[..., OpenPage], east: float, north: float) -> tuple[np.ndarray, np.ndarray]:
     """Pixels of the reflectors' marks, and the picture of the floor; clicks and the pointer are tried on the way."""
     project = moved(room(), east, north)
-    served = Served(project, source=VirtualDrive(project.routes[0].name))
-    try:
-        served.until(lambda: served.view is not None)
-        served.runtime.post(Play(playing=False))
-        served.runtime.post(Seek(6.0))
+    with standing_drive(project, at=6.0) as served:
         page = window(served.server, sharp=True)
         client = page.open(nodes=["/run/gates", "/vehicle"])
         page.page.wait_for_timeout(1500)
@@ -52,8 +47,6 @@ def seen_at(window: Callable[..., OpenPage], east: float, north: float) -> tuple
         assert abs(float(y) - (north + 4.0)) < 0.02
         assert page.errors == []
         return np.array(marks), picture
-    finally:
-        served.close()
 
 
 def test_at_a_national_grid_marks_names_and_clicks_are_where_they_are_at_zero(

@@ -6,12 +6,11 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from commission.app.run.actions import Play, VirtualDrive
 from commission.app.run.state import RunState
 from commission.io.project_file import load_project, save_project
 from tests.app.sites import room
 from tests.browser.page import OpenPage
-from tests.browser.serving import Served
+from tests.browser.serving import Served, standing_drive
 
 TABLE = "id;x;y;radius\nNew;2.5;2.5;0.04\n"
 DROP = """([name, text]) => {
@@ -34,15 +33,11 @@ def drop(page: OpenPage, *paths: str) -> None:
 @pytest.fixture(scope="module")
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     folder = tmp_path_factory.mktemp("served") / "hall"
-    project = room()
-    save_project(project, folder)
+    save_project(room(), folder)
     (folder / "drives" / "empty").mkdir(parents=True)
     (folder / "list.csv").write_text(TABLE)
-    opened = Served(load_project(folder), folder, source=VirtualDrive(project.routes[0].name))
-    opened.until(lambda: opened.view is not None)
-    opened.runtime.post(Play(playing=False))
-    yield opened
-    opened.close()
+    with standing_drive(load_project(folder), folder) as opened:
+        yield opened
 
 
 def test_files_are_found_by_looking_and_a_failed_open_changes_nothing(  # noqa: PLR0915 - one window for all

@@ -10,21 +10,16 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from commission.app.base.theme import LEFT_PX, RIGHT_PX
-from commission.app.run.actions import Play, VirtualDrive
 from tests.app.sites import room
 from tests.browser.page import OpenPage
-from tests.browser.serving import Served
+from tests.browser.serving import Served, standing_drive
 from tests.browser.test_floor_view import metre
 
 
 @pytest.fixture(scope="module")
 def served() -> Iterator[Served]:
-    project = room()
-    opened = Served(project, source=VirtualDrive(project.routes[0].name))
-    opened.until(lambda: opened.view is not None)
-    opened.runtime.post(Play(playing=False))
-    yield opened
-    opened.close()
+    with standing_drive(room()) as opened:
+        yield opened
 
 
 @pytest.fixture(scope="module")

@@ -9,14 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from commission.app.run.actions import Play, Seek, VirtualDrive
 from commission.io.map_server import write_floor_map
 from commission.io.project_file import open_project
 from commission.site.reflectors import Reflector
 from commission.studies.prediction import PredictionInput, prediction
 from tests.app.sites import room
 from tests.browser.page import SMALL, OpenPage
-from tests.browser.serving import Served
+from tests.browser.serving import Served, standing_drive
 
 
 def second(served: Served) -> Reflector:
@@ -122,12 +121,7 @@ def test_who_reads_only_the_page_comes_from_an_empty_folder_to_a_prediction_with
 def test_arrows_move_the_selection_by_millimetres_and_escape_cancels_wherever_the_focus_is(
     window: Callable[..., OpenPage],
 ) -> None:
-    project = room()
-    served = Served(project, source=VirtualDrive(project.routes[0].name))
-    try:
-        served.until(lambda: served.view is not None)
-        served.runtime.post(Play(playing=False))
-        served.runtime.post(Seek(6.0))
+    with standing_drive(room(), at=6.0) as served:
         page = window(served.server, (1024, 700))
         client = page.open()
         page.click_at((0.25, 6.5))
@@ -150,5 +144,3 @@ def test_arrows_move_the_selection_by_millimetres_and_escape_cancels_wherever_th
         page.page.keyboard.press("Escape")
         served.until(lambda: not served.editor(client.client_id).has_selection)
         assert page.errors == []
-    finally:
-        served.close()

@@ -12,13 +12,12 @@ from PIL import Image
 
 from commission.app.base import theme
 from commission.app.base.actions import Magnify
-from commission.app.run.actions import Play, Seek, VirtualDrive
 from commission.app.run.detection_layer import PIXELS
 from commission.localization.estimate import Status
 from tests.app.run.test_drawn_detections import gate_of, is_inside
 from tests.app.sites import room
 from tests.browser.page import OpenPage
-from tests.browser.serving import Served
+from tests.browser.serving import Served, standing_drive
 
 HEIGHTS = (4.0, 1.0, 0.3)
 """Metres of the floor from the upper to the lower edge of the picture."""
@@ -26,14 +25,8 @@ HEIGHTS = (4.0, 1.0, 0.3)
 
 @pytest.fixture(scope="module")
 def served() -> Iterator[Served]:
-    project = room()
-    opened = Served(project, source=VirtualDrive(project.routes[0].name))
-    opened.until(lambda: opened.view is not None)
-    opened.runtime.post(Play(playing=False))
-    opened.runtime.post(Seek(6.0))
-    opened.until(lambda: opened.view is not None and opened.view.time == pytest.approx(6.0))
-    yield opened
-    opened.close()
+    with standing_drive(room(), at=6.0) as opened:
+        yield opened
 
 
 def look_at(page: OpenPage, client: viser.ClientHandle, place: np.ndarray, height: float) -> None:

@@ -14,7 +14,7 @@ from PIL import Image
 
 from commission.app.base import theme
 from commission.app.base.panel import clock
-from commission.app.run.actions import Play, Seek, VirtualDrive
+from commission.app.run.actions import Seek
 from commission.app.run.service import RunService
 from commission.app.run.view import RunView
 from commission.geometry.arrays import read_only
@@ -22,7 +22,7 @@ from commission.localization.estimate import Status
 from commission.studies.run import RunResult
 from tests.app.sites import room
 from tests.browser.page import SMALL, OpenPage
-from tests.browser.serving import Served
+from tests.browser.serving import Served, standing_drive
 
 COUNTS, NIS, POSITION = "Inliers, outliers per scan", "NIS of all detections", "2σ of position [mm]"
 SHOWN = "window.commissionPlots.shown"
@@ -30,18 +30,13 @@ SHOWN = "window.commissionPlots.shown"
 
 @pytest.fixture(scope="module")
 def served() -> Iterator[Served]:
-    project = room(rate=100.0)
-    opened = Served(project, source=VirtualDrive(project.routes[0].name))
-    opened.until(lambda: opened.view is not None)
-    opened.runtime.post(Play(playing=False))
-    yield opened
-    opened.close()
+    with standing_drive(room(rate=100.0)) as opened:
+        yield opened
 
 
 def at_one_second(served: Served, opened: OpenPage) -> OpenPage:
     opened.page.wait_for_function(f"() => {SHOWN}.titles.length === 6")
-    served.runtime.post(Seek(1.0))
-    served.until(lambda: run_of(served).time == pytest.approx(1.0))
+    served.seek(1.0)
     opened.page.wait_for_function(f"() => {SHOWN}.cursor.time === 1")
     return opened
 

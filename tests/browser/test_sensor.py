@@ -10,12 +10,11 @@ import pytest
 from commission.app.base.view import view_of
 from commission.app.live.sensor_panel import scan_of
 from commission.app.live.state import SensorWatch
-from commission.app.run.actions import Play, Seek, VirtualDrive
 from commission.app.run.service import RunService
 from commission.site.disturbances import ShinyObject
 from tests.app.sites import room
 from tests.browser.page import OpenPage
-from tests.browser.serving import Served
+from tests.browser.serving import Served, standing_drive
 
 WORDS_IN_EACH_OTHER = """() => [...document.querySelectorAll('.c-s-plot')].flatMap((plot) => {
   const words = [...plot.querySelectorAll('.c-s-title, .c-s-top, .c-s-y, .c-s-line b')];
@@ -42,13 +41,8 @@ def served() -> Iterator[Served]:
     light = replace(project.disturbances.intensity, enabled=True)
     shiny = ShinyObject(x=POST[0], y=POST[1], radius=0.05)
     project = replace(project, disturbances=replace(project.disturbances, intensity=light, shiny_objects=(shiny,)))
-    opened = Served(project, source=VirtualDrive(project.routes[0].name))
-    opened.until(lambda: opened.view is not None)
-    opened.runtime.post(Play(playing=False))
-    opened.runtime.post(Seek(6.0))
-    opened.until(lambda: opened.view is not None and opened.view.time == pytest.approx(6.0))
-    yield opened
-    opened.close()
+    with standing_drive(project, at=6.0) as opened:
+        yield opened
 
 
 @pytest.fixture(scope="module")

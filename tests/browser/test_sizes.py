@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from commission.app.run.actions import Play, Seek, VirtualDrive
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.tags import Tag
 from tests.app.sites import room
 from tests.browser.page import OpenPage
-from tests.browser.serving import Served
+from tests.browser.serving import Served, standing_drive
 
 SIZES = ((1024, 700), (1280, 720), (1600, 900), (1920, 1080), (2560, 1440))
 CUT_OFF = """() => {
@@ -90,13 +89,8 @@ def wall_of(count: int) -> Project:
 
 @pytest.fixture(scope="module")
 def served() -> Iterator[Served]:
-    project = wall_of(60)
-    opened = Served(project, source=VirtualDrive(project.routes[0].name))
-    opened.until(lambda: opened.view is not None)
-    opened.runtime.post(Play(playing=False))
-    opened.runtime.post(Seek(5.0))
-    yield opened
-    opened.close()
+    with standing_drive(wall_of(60), at=5.0) as opened:
+        yield opened
 
 
 def test_no_button_or_name_is_cut_off_at_any_size(served: Served, window: Callable[..., OpenPage]) -> None:

@@ -13,13 +13,13 @@ from PIL import Image
 
 from commission.app.base.panel import clock
 from commission.app.editing.editor import editors_of
-from commission.app.run.actions import Cover, Play, Seek, VirtualDrive
+from commission.app.run.actions import Cover, Seek
 from commission.app.run.found_table import BY_KEY, Found, classes_of, palette
 from commission.app.run.service import RunService
 from commission.app.run.state import RunState
 from tests.app.sites import room
 from tests.browser.page import OpenPage
-from tests.browser.serving import Served
+from tests.browser.serving import Served, standing_drive
 
 EVENTS, REFLECTORS = ".c-events tbody tr", ".c-reflectors tbody tr"
 
@@ -27,16 +27,10 @@ EVENTS, REFLECTORS = ".c-events tbody tr", ".c-reflectors tbody tr"
 @pytest.fixture(scope="module")
 def served() -> Iterator[Served]:
     """A drive in which nothing is seen from 4 s on."""
-    project = room()
-    opened = Served(project, source=VirtualDrive(project.routes[0].name))
-    opened.until(lambda: opened.view is not None)
-    opened.runtime.post(Play(playing=False))
-    opened.runtime.post(Seek(4.0))
-    opened.until(lambda: opened.view is not None and opened.view.time == pytest.approx(4.0))
-    opened.runtime.post(Cover(covered=True))
-    opened.until(lambda: any(event.kind.value == "blind" for event in found_in(opened).events.events))
-    yield opened
-    opened.close()
+    with standing_drive(room(), at=4.0) as opened:
+        opened.runtime.post(Cover(covered=True))
+        opened.until(lambda: any(event.kind.value == "blind" for event in found_in(opened).events.events))
+        yield opened
 
 
 def found_in(served: Served) -> Found:

@@ -7,10 +7,9 @@ from collections.abc import Callable
 import pytest
 
 from commission.app.floor_map.align_tool import AlignTool
-from commission.app.run.actions import Play, VirtualDrive
 from tests.app.sites import room
 from tests.browser.page import OpenPage
-from tests.browser.serving import Served
+from tests.browser.serving import Served, standing_drive
 
 
 def where(page: OpenPage) -> tuple[float, ...]:
@@ -35,11 +34,7 @@ def begin_to_align(page: OpenPage, served: Served, browser: int) -> None:
 def test_closing_one_browser_disturbs_nobody_and_a_reload_keeps_tab_folder_and_place(
     window: Callable[..., OpenPage],
 ) -> None:
-    project = room()
-    served = Served(project, source=VirtualDrive(project.routes[0].name))
-    try:
-        served.until(lambda: served.view is not None)
-        served.runtime.post(Play(playing=False))
+    with standing_drive(room()) as served:
         page, other = window(served.server, (1024, 700)), window(served.server, (1024, 700))
         client = page.open()
         page.open_tab("Plan")
@@ -83,5 +78,3 @@ def test_closing_one_browser_disturbs_nobody_and_a_reload_keeps_tab_folder_and_p
         corners = [page.pixel_of((x, y)) for x in (0.0, 12.0) for y in (0.0, 8.0)]
         assert all(floor["x"] < x < floor["x"] + floor["width"] for x, _ in corners), "who saw all sees all again"
         assert page.errors == []
-    finally:
-        served.close()

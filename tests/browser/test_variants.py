@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from commission.app.run.actions import Play, Seek, VirtualDrive
 from commission.app.run.charts import color_of
 from commission.app.run.service import RunService
 from commission.app.tune.calibration_service import CalibrationService
@@ -16,20 +15,15 @@ from commission.studies.map_findings import MapFault, MapFinding
 from commission.studies.variants import VariantsResult
 from tests.app.sites import room
 from tests.browser.page import OpenPage
-from tests.browser.serving import Served
+from tests.browser.serving import Served, standing_drive
 
 FIGURES = ".c-variants table:not(.c-moments) tbody tr"
 
 
 @pytest.fixture(scope="module")
 def served() -> Iterator[Served]:
-    project = room()
-    opened = Served(project, source=VirtualDrive(project.routes[0].name))
-    opened.until(lambda: opened.view is not None)
-    opened.runtime.post(Play(playing=False))
-    opened.runtime.post(Seek(10.0))
-    yield opened
-    opened.close()
+    with standing_drive(room(), at=10.0) as opened:
+        yield opened
 
 
 def compared(served: Served) -> VariantsResult | None:
