@@ -122,7 +122,7 @@ class ConstantErrors:
         tuple[float, float, float],
         _sigma("Mounting x 1σ"),
         _sigma("Mounting y 1σ"),
-        Quantity(label="Mounting heading 1σ", unit="rad", shown=DEGREES, bounds=_SHORT, step=0.01, decimals=6),
+        Quantity(label="Facing 1σ", unit="rad", shown=DEGREES, bounds=_SHORT, step=0.01, decimals=6),
     ] = (0.0, 0.0, 0.0)
     """1-sigma of what the true mounting of each scanner has more than the project's: x, y and heading."""
     range_bias_sigma: Annotated[float, _sigma("Range bias 1σ")] = 0.0
@@ -131,11 +131,11 @@ class ConstantErrors:
         float, Quantity(label="Clock 1σ", unit="s", shown=_MILLISECONDS, bounds=_SHORT, step=0.1, decimals=6)
     ] = 0.0
     """1-sigma of how much later than they were taken the scans of each scanner are stamped."""
-    forward_scale_sigma: Annotated[float, _scale("Wheels too small 1σ")] = 0.0
+    forward_scale_sigma: Annotated[float, _scale("All wheels 1σ")] = 0.0
     """1-sigma of the share by which all wheels together report too much way."""
     wheel_scale_sigma: Annotated[float, _scale("Each wheel 1σ")] = 0.0
     """1-sigma of the share by which each driven wheel alone reports too much way: left and right differ."""
-    separation_scale_sigma: Annotated[float, _scale("Wheel separation 1σ")] = 0.0
+    separation_scale_sigma: Annotated[float, _scale("Separation 1σ")] = 0.0
     """1-sigma of the share by which the true distance between the wheels is larger than the vehicle's."""
     scanners: tuple[ScannerError, ...] = ()
     """Errors of single scanners that are no chance; what is drawn comes on top."""

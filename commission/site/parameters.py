@@ -345,7 +345,7 @@ class TagParameters:
         Quantity(label="Tag turned 1σ", unit="rad", shown=DEGREES, bounds=POSITIVE, step=0.01, slider=(0.1, 10.0)),
     ] = 0.02
     """1-sigma noise of a tag's measured heading, where the recording does not say it."""
-    gate_probability: Annotated[float, _gate("Tag accepted to")] = 0.999
+    gate_probability: Annotated[float, _gate("Tag gate")] = 0.999
     """Probability that a true sighting falls inside the validation gate, of three degrees of freedom."""
 
     def __post_init__(self) -> None:
@@ -358,7 +358,7 @@ class BearingParameters:
 
     enabled: Annotated[bool, Switch("Bearings alone")] = True
     """Whether bearings of a goniometer correct the pose, where the vehicle has one."""
-    gate_probability: Annotated[float, _gate("Bearing accepted to")] = 0.999
+    gate_probability: Annotated[float, _gate("Bearing gate")] = 0.999
     """Probability that a true bearing falls inside the validation gate, of one degree of freedom."""
     lasting_limit: Annotated[
         float, Quantity(label="Mean innovation to", unit="σ", bounds=NOT_NEGATIVE, step=0.5, slider=(0.0, 20.0))
@@ -457,12 +457,10 @@ class TemporaryParameters:
     """1-sigma noise of a beam's end; what the beams of a reel show counts where it is more."""
     position_sigma: Annotated[
         float,
-        Quantity(
-            label="Landmark seen 1σ", unit="m", shown=MILLIMETRES, bounds=NOT_NEGATIVE, step=0.5, slider=(0.0, 100.0)
-        ),
+        Quantity(label="Landmark 1σ", unit="m", shown=MILLIMETRES, bounds=NOT_NEGATIVE, step=0.5, slider=(0.0, 100.0)),
     ] = 0.01
     """1-sigma noise of a measured place besides that of its beams, each axis."""
-    gate_probability: Annotated[float, _gate("Landmark accepted to")] = 0.99
+    gate_probability: Annotated[float, _gate("Landmark gate")] = 0.99
     """Probability that a true sighting of a landmark falls inside the validation gate."""
     confirmations: Annotated[
         int, Quantity(label="Born after", unit="scans", bounds=Bounds.between(1, 100), step=1, slider=(1, 20))
@@ -481,7 +479,7 @@ class TemporaryParameters:
     ] = 1.0
     """1-sigma of its place, in any direction, from which on a landmark is forgotten."""
     reach: Annotated[
-        float, Quantity(label="Remembered within", unit="m", bounds=POSITIVE, step=1.0, slider=(5.0, 200.0))
+        float, Quantity(label="Remembered to", unit="m", bounds=POSITIVE, step=1.0, slider=(5.0, 200.0))
     ] = 30.0
     """Distance from the vehicle up to which landmarks are looked for and remembered."""
 
@@ -561,7 +559,7 @@ class SupervisorParameters:
     ] = 0.7
     """Share of all rejected detections, false ones among people and shiny things too, beyond which it is lost."""
     rejection_scans: Annotated[
-        int, Quantity(label="Scans against it", unit="scans", bounds=Bounds.at_least(1.0), step=1, slider=(3, 50))
+        int, Quantity(label="Against it", unit="scans", bounds=Bounds.at_least(1.0), step=1, slider=(3, 50))
     ] = 10
     """Scans in a row that reject three detections or more, and accept at most a quarter as many, until it is lost: a
     vehicle that was carried away is told sooner than by any share."""
@@ -571,7 +569,7 @@ class SupervisorParameters:
     """Multiple of the limits: where a 2σ passes it before a scan, any reflector is accepted, and its pose must prove
     right. So after missing odometry, or long without reflectors."""
     confirmations: Annotated[
-        int, Quantity(label="Confirmed by", unit="detections", bounds=NOT_NEGATIVE, step=1, slider=(0, 100))
+        int, Quantity(label="Proven by", unit="detections", bounds=NOT_NEGATIVE, step=1, slider=(0, 100))
     ] = 20
     """Detections accepted after such doubt until the vehicle may drive; 0: none, as Algorithm 4 has it."""
     find_again: Annotated[bool, Switch("Search when lost")] = True

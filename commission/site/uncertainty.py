@@ -40,7 +40,7 @@ class Uncertainty:
     mounting_heading: Annotated[
         float,
         Quantity(
-            label="Mounting heading 1σ",
+            label="Facing 1σ",
             unit="rad",
             shown=DEGREES,
             bounds=_SHORT,

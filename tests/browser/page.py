@@ -217,8 +217,9 @@ class OpenPage:
             self.wait_for_text(holds)
 
     def row(self, label: str) -> Locator:
-        """The row of widgets behind this label."""
-        return self.page.locator("label", has_text=label).locator("xpath=ancestor::*[contains(@class,'Flex-root')][1]")
+        """The row of widgets behind the label that begins so."""
+        begins = re.compile(rf"^\s*{re.escape(label)}")
+        return self.page.locator("label", has_text=begins).locator("xpath=ancestor::*[contains(@class,'Flex-root')][1]")
 
     def fill(self, label: str, text: str) -> None:
         """Type into the input of this label and leave it."""

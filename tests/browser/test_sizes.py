@@ -67,6 +67,21 @@ LINES_OF_LABELS = """() => [...document.querySelectorAll('[data-dock-region=left
   return [each.textContent, new Set([...words.getClientRects()].map((box) => Math.round(box.top))).size];
 })"""
 """Each label of the steps, and in how many lines it stands."""
+GAPS_OF_BOXES = """() => [...document.querySelectorAll('[data-dock-region=left] input[type=checkbox]')].filter(
+  (each) => each.checkVisibility()).map((each) => {
+  const name = each.closest('.mantine-Flex-root:has(label[for])').querySelector('label[for]');
+  const [words, box] = [name.getBoundingClientRect(), each.getBoundingClientRect()];
+  return [name.textContent, words.left - box.right, (words.top + words.bottom - box.top - box.bottom) / 2];
+})"""
+"""Each check box of the steps, how far it stands from its name and how much higher than that [pixels]."""
+ROOM_ON_THE_RIGHT = """() => {
+  const seen = (name) => [...document.querySelectorAll(name)].find((each) => each.checkVisibility());
+  const viewOf = (each) => each.closest('.mantine-ScrollArea-viewport').getBoundingClientRect();
+  const picture = seen('.c-a-picture'), box = picture.getBoundingClientRect();
+  return { selection: viewOf(seen('[data-dock-region=right] .c-nothing')).height, picture: box.height,
+           cut: box.bottom - viewOf(picture).bottom };
+}"""
+"""Heights of the selection's view and of the association's picture, and how much of that is cut off [pixels]."""
 CLOSED = """() => [...document.querySelectorAll('[data-dock-region=left] .mantine-Paper-root[data-with-border]')]
   .filter((each) => each.offsetParent && each.innerText && !each.innerText.includes('\\n'))
   .map((each) => each.innerText)"""
@@ -106,11 +121,6 @@ def test_no_button_or_name_is_cut_off_at_any_size(served: Served, window: Callab
         names = page.page.evaluate("() => window.commissionPlots.namesShown")
         assert {"x", "y", "largest", "inliers", "outliers"} <= {name.split(" ")[0] for name in names}, (width, names)
     assert found == {size: [] for size in SIZES}
-    # A check box has its line to itself, and no name is a column of words.
-    for tab, most in (("Run", 1), ("Tune", 2)):
-        page.open_tab(tab)
-        page.page.wait_for_function(f"() => ({LINES_OF_LABELS})().length > 5")
-        assert [name for name, lines in page.page.evaluate(LINES_OF_LABELS) if lines > most] == []
     # In the lowest window a table has rows, and a list of corners is seen to its end.
     page.page.set_viewport_size({"width": SIZES[0][0], "height": SIZES[0][1]})
     page.open_tab("Reflectors")
@@ -124,14 +134,16 @@ def test_no_button_or_name_is_cut_off_at_any_size(served: Served, window: Callab
     outline = page.row("Outline").locator("input")
     assert len(outline.input_value().split(",")) == 4
     assert outline.evaluate("e => e.scrollWidth <= e.clientWidth")
-    # In the other steps, with everything open that they hold, each label stands in one line.
-    for tab in ("Site", "Plan"):
+    # In each step, with everything open that it holds, each label stands in one line, and a check box beside its name.
+    for tab in ("Site", "Plan", "Run", "Tune"):
         page.open_tab(tab)
         for _ in range(3):  # a folder may hold others
             for name in page.page.evaluate(CLOSED):
                 page.fold(name)
         page.page.wait_for_function(f"() => ({LINES_OF_LABELS})().length > 20")
         assert [name for name, lines in page.page.evaluate(LINES_OF_LABELS) if lines > 1] == []
+        gaps = page.page.evaluate(GAPS_OF_BOXES)
+        assert [each for each in gaps if not 2.0 <= each[1] <= 14.0 or abs(each[2]) > 2.0] == []
     # The rail shows which tool is in use, whether a key or the rail has chosen it.
     page.page.mouse.move(600, 300)
     for choose, lit in (
@@ -143,6 +155,20 @@ def test_no_button_or_name_is_cut_off_at_any_size(served: Served, window: Callab
         choose()
         page.page.mouse.move(600, 300)
         page.page.wait_for_function(f"name => String(({LIT})()) === name", arg=lit)
+
+
+def test_the_selection_keeps_room_beside_the_association(served: Served, window: Callable[..., OpenPage]) -> None:
+    page = window(served.server, SIZES[0])
+    page.open(nodes=["/vehicle"])
+    page.open_tab("Association")
+    for width, height in SIZES[:4]:
+        page.page.set_viewport_size({"width": width, "height": height})
+        page.page.wait_for_timeout(400)
+        found = page.page.evaluate(ROOM_ON_THE_RIGHT)
+        # A title and two fields at least; the picture is there whole.
+        assert found["selection"] >= 90.0, (width, height)
+        assert found["picture"] >= 120.0, (width, height)
+        assert found["cut"] <= 0.0, (width, height)
 
 
 @pytest.mark.with_all_seeds

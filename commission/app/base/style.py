@@ -23,6 +23,8 @@ NOW_LINE_PX = 17
 """Height of a line of the numbers of now [pixels]."""
 NOW_PX, LOW_NOW_PX, HIGH_NOW_PX = (6 + lines * NOW_LINE_PX for lines in (11, 6, 15))
 """Height of the numbers of now [pixels], and where the window is low or high: whole lines, so that none is cut."""
+LESS_NOW_PX, LEAST_NOW_PX = (6 + lines * NOW_LINE_PX for lines in (8, 4))
+"""Beside the picture of the association, and where the window is low: the selection needs the room."""
 LIT_CAMERA = ",".join(
     f":root[data-camera~='{camera.value}'] div:has(>.c-cameras)+div button:nth-child({place})"
     for place, camera in enumerate(Camera, start=1)
@@ -83,6 +85,9 @@ div:has(>div>.c-bottom):has(.c-no-run)>:nth-child(4){{grid-column:1/span 24!impo
 :root{{--c-now:{NOW_PX}px}}
 @media (max-height:800px){{:root{{--c-now:{LOW_NOW_PX}px}}}}
 @media (min-height:1000px){{:root{{--c-now:{HIGH_NOW_PX}px}}}}
+:root[data-shows~=c-association]{{--c-now:{LESS_NOW_PX}px}}
+@media (max-height:800px){{:root[data-shows~=c-association]{{--c-now:{LEAST_NOW_PX}px}}}}
+@media (min-height:1000px){{:root[data-shows~=c-association]{{--c-now:{NOW_PX}px}}}}
 :root:has(.c-no-run){{--c-now:34px}}
 [data-dock-region=right]{{box-sizing:border-box;padding-top:var(--c-now)}}
 div:has(>div>.c-top)>div:has(.c-now){{position:absolute}}
@@ -134,8 +139,8 @@ div:has(>div>.c-top)>div:has(.c-now){{position:absolute}}
 [data-dock-region] .mantine-Slider-root~.mantine-NumberInput-root{{width:68px!important;margin-left:6px!important}}
 .c-reflectors :is(td,th):first-child{{position:sticky;left:-8px;z-index:1;background:{css(Surface.HEAD.dark)}}}
 .c-reflectors th:first-child{{z-index:2}}
-@media (max-height:1000px){{.c-a-picture{{max-width:206px}} .c-a-picture :is(.c-a-word,.c-a-length){{font-size:15px}}}}
-@media (max-height:800px){{.c-a-picture :is(.c-a-word,.c-a-length){{font-size:19px}}}}
+@media (max-height:1000px){{.c-a-picture{{max-width:186px}} .c-a-picture :is(.c-a-word,.c-a-length){{font-size:16px}}}}
+@media (max-height:800px){{.c-a-picture :is(.c-a-word,.c-a-length){{font-size:22px}}}}
 .mantine-Button-label{{text-box:normal!important}}
 .c-data{{overflow:auto;font-size:12px;margin:0 2px 0 4px;scrollbar-width:thin}}
 .c-data h4{{margin:6px 0 1px;font-size:11px;font-weight:600;opacity:.65;position:sticky;left:0}}

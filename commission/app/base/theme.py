@@ -307,9 +307,12 @@ div:has(>:is(.c-wide,.c-live,.c-path,.c-list-line)){{display:none}}
 input:not(:focus){{text-overflow:ellipsis}}
 {LABEL}:not({SLIDER}){{width:130px!important;padding-right:4px!important}}
 {LABEL} .mantine-Text-root{{letter-spacing:-.4px!important;font-size:12px!important}}
+{LABEL}{SLIDER}{{width:128px!important;padding-right:4px!important}}
 {LABEL}{SLIDER} .mantine-Text-root{{letter-spacing:-.5px!important;font-size:11.5px!important}}
+{LABEL}{SLIDER}+* .mantine-NumberInput-root{{width:58px!important;margin-left:8px!important}}
 .mantine-Flex-root:has(>div input[type=checkbox])>:has(>p>label){{flex:1 1 auto!important}}
-.mantine-Flex-root:has(>div input[type=checkbox])>:not(:has(label)){{flex:none!important}}
+.mantine-Flex-root:has(>div input[type=checkbox])>:not(:has(label)){{flex:none!important;order:-1;margin-right:8px;
+ transform:translateY(2.5px)}}
 div:has(>.c-wide)+*>.mantine-Flex-root>[style*="flex-shrink: 0"]{{display:none}}
 div:has(>.c-tools)+* .mantine-Button-root{{padding:0 4px!important;font-size:11px!important;min-width:0!important;
  flex:1 1 auto!important}}
@@ -369,10 +372,9 @@ div:has(>.c-rows)~div .mantine-Button-label{{white-space:pre-wrap;text-align:lef
 .c-scale{{position:fixed;left:{LEFT_PX + 16}px;top:calc(var(--c-top) + 10px);padding:1px 8px;border-radius:3px;
  background:rgba(16,18,21,.8);color:{css(Worded.NOTE.dark)};font-size:12px;pointer-events:none;white-space:nowrap}}
 [data-dock-region=right] [role=tab]{{padding:0 .62em!important}}
-[data-shows~=c-association] [data-dock-scroll]>div:has(.c-association){{flex-grow:2!important}}
+[data-shows~=c-association] [data-dock-scroll]>div:has(.c-association){{flex-grow:1!important}}
 .c-association{{padding:0 12px 0 4px}}
-@media (max-height:800px){{.c-a-picture{{max-width:156px!important}}
- [data-shows~=c-association] [data-dock-scroll]>div:has(.c-association){{flex-grow:2.2!important}}
+@media (max-height:800px){{.c-a-picture{{max-width:130px!important}}
  :root:not([data-shows~=c-association]) [data-dock-region=right] [data-dock-scroll]>div:has([role=tab][title=Selection])
  {{flex-grow:1.5!important}}}}
 .mantine-Slider-markWrapper:only-child .mantine-Slider-mark{{background:{css(SELECTED)};border:none;width:2px;

@@ -32,7 +32,7 @@ FIELDS = {
     "wheels.forward_per_sqrt_m": ("Along [mm/√m]", 1000.0),
     "wheels.lateral_per_sqrt_m": ("Across [mm/√m]", 1000.0),
     "wheels.heading_per_sqrt_m": ("Heading [°/√m]", DEGREES),
-    "wheels.heading_per_sqrt_rad": ("Heading, turning [°/√rad]", DEGREES),
+    "wheels.heading_per_sqrt_rad": ("Turning [°/√rad]", DEGREES),
     "wheels.forward_per_sqrt_s": ("Along, in time [mm/√s]", 1000.0),
     "wheels.heading_per_sqrt_s": ("Heading, in time [°/√s]", DEGREES),
     "intensity.reference_distance": ("Intensities at [m]", 1.0),
@@ -54,12 +54,12 @@ FIELDS = {
     "constants.survey_sigma": ("Survey 1σ [mm]", 1000.0),
     "constants.mounting_sigma[0]": ("Mounting x 1σ [mm]", 1000.0),
     "constants.mounting_sigma[1]": ("Mounting y 1σ [mm]", 1000.0),
-    "constants.mounting_sigma[2]": ("Mounting heading 1σ [°]", DEGREES),
+    "constants.mounting_sigma[2]": ("Facing 1σ [°]", DEGREES),
     "constants.range_bias_sigma": ("Range bias 1σ [mm]", 1000.0),
     "constants.clock_offset_sigma": ("Clock 1σ [ms]", 1000.0),
-    "constants.forward_scale_sigma": ("Wheels too small 1σ [%]", 100.0),
+    "constants.forward_scale_sigma": ("All wheels 1σ [%]", 100.0),
     "constants.wheel_scale_sigma": ("Each wheel 1σ [%]", 100.0),
-    "constants.separation_scale_sigma": ("Wheel separation 1σ [%]", 100.0),
+    "constants.separation_scale_sigma": ("Separation 1σ [%]", 100.0),
 }
 """Label and factor of the unit of each number's widget."""
 IN_FILE = {"shiny_objects", "tilted_stretches", "covered", "reels", "constants.scanners"}
