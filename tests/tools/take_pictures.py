@@ -413,7 +413,8 @@ def served(picture: Picture) -> Iterator[Served]:
 def take(browser: Browser, picture: Picture, size: tuple[int, int], path: Path) -> None:
     """Take one picture with a window of a size [pixels]."""
     with served(picture) as site:
-        runtime, page = site.runtime, OpenPage(browser, site.server, size)
+        # At full resolution, which viser lowers while the machine is busy.
+        runtime, page = site.runtime, OpenPage(browser, site.server, size, 1.0)
         page.page.set_default_timeout(60_000)
         page.open(nodes=("/floor/map", "/vehicle/outline"))
         runtime.post(Play(playing=False))
