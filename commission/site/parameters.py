@@ -176,7 +176,8 @@ class DetectorParameters:
     """Whether clusters with too few or too many beams for a reflector at their range are rejected (detector filter)."""
     intensity_threshold: Annotated[
         float,
-        Quantity(label="Intensity from", unit="sensor's unit", shown=Shown("", 1.0), step=0.01, slider=(0.0, 1.0)),
+        # No slider: sensors count to 1, 254 or 65,535, and the line of the sensor view is dragged over what they say.
+        Quantity(label="Intensity from", unit="sensor's unit", shown=Shown("", 1.0), step=0.01),
     ] = 0.5
     """Echo strength from which a beam counts as reflective, where the scanner gives no flag."""
     far_threshold: Annotated[

@@ -86,6 +86,16 @@ def test_a_person_drags_the_threshold_over_the_peaks_and_takes_it_back(served: S
     page.page.keyboard.press("Control+z")
     served.until(lambda: served.state.project.parameters.detector.intensity_threshold == 0.5)
     page.wait_for_text(f"{len(found.clusters)} clusters")
+    # Sensors count to 254 or 65,535: what a person reads off the picture can be typed.
+    page.open_tab("Tune")
+    page.row("Intensity from").locator("input").last.click()
+    for typed, said in (("150.5", "0 clusters"), ("0.5", f"{len(found.clusters)} clusters")):
+        page.page.keyboard.press("Control+a")
+        page.page.keyboard.type(typed, delay=80)
+        page.page.keyboard.press("Enter")
+        served.until(lambda t=typed: served.state.project.parameters.detector.intensity_threshold == float(t), 20.0)
+        page.wait_for_text(said)
+    page.wait_for_text(f"{len(found.clusters)} clusters")
     assert page.errors == []
 
 
