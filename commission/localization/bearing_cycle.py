@@ -6,6 +6,7 @@ bearing needs no evolution between reflexes: the pose goes along with odometry, 
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -31,7 +32,7 @@ from commission.localization.consider_columns import carry_over
 from commission.localization.contour import ContourScan
 from commission.localization.cycle import Cycle, held_back, supervised, with_temporary
 from commission.localization.filter_kinds import is_invariant
-from commission.localization.lasting import lasts, remember, with_lasting
+from commission.localization.lasting import MET, lasts, remember, with_lasting
 from commission.localization.odometry import NextOdometry, reach, velocity
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.rejection import (
@@ -131,7 +132,14 @@ def process_reflex(  # noqa: PLR0917 - outputs are written into the arrays of th
         prior, belief, temporary, memory, scan, state, motion, following, stamp_ns, model, cross, busy, goods
     )
     use, named = figures[row, USE], reflexes.entries[row] >= 0
-    evidence = weigh_bearing(state.evidence, stamp_ns, prior, use, named and figures[row, REFLECTOR] >= 0, model)
+    near = 0.0
+    if use == ACCEPTED:
+        reflexes.lasting[int(figures[row, REFLECTOR]), MET] = stamp_ns * 1e-9
+    elif use == REJECTED and named:
+        near = 1.0 if figures[row, REFLECTOR] >= 0 else 0.0
+    elif use == REJECTED:
+        near = share_missing(prior, stamp_ns, places, reflexes)
+    evidence = weigh_bearing(state.evidence, stamp_ns, prior, use, near, model)
     evidence = weigh_lasting(evidence, stamp_ns, prior, figures[row], named, reflexes, places, twist, model.consider)
     figures[row, LASTING] = 1.0 if evidence.lasting else 0.0
     pivot = state.pivot if cross is None else (belief.x, belief.y)
@@ -186,8 +194,37 @@ def weigh_lasting(  # noqa: PLR0917 - a reflex and what is known around it
 
 
 @compiled_inline
+def share_missing(prior: PoseGaussian, stamp_ns: int, places: FloatArray, reflexes: Reflexes) -> float:
+    """Share of the reflectors within reach that no bearing of late was of [0..1].
+
+    Parameters
+    ----------
+    prior : where the vehicle believes to be.
+    stamp_ns : of now [ns].
+    places : the map, see `ReflectorIndex`.
+    reflexes : the goniometer, and when each reflector was met.
+
+    Notes
+    -----
+    missing / (missing + met), by definition. A bearing that fits none of the map's is of a thing that the map lacks, or
+    of a reflector that is expected elsewhere: the more of those are missing, the likelier.
+    """
+    model, mount = reflexes.model, reflexes.model.observation
+    c, s = math.cos(prior.theta), math.sin(prior.theta)
+    x, y = prior.x + c * mount.mount_x - s * mount.mount_y, prior.y + s * mount.mount_x + c * mount.mount_y
+    missing, within = 0.0, 0.0
+    for entry in range(len(places)):
+        distance = math.hypot(places[entry, 0] - x, places[entry, 1] - y)
+        if model.nearest <= distance <= model.farthest:
+            within += 1.0
+            met = reflexes.lasting[int(places[entry, 3]), MET]
+            missing += 1.0 if stamp_ns * 1e-9 - met > model.turns_s or met == 0.0 else 0.0
+    return missing / max(within, 1.0)
+
+
+@compiled_inline
 def weigh_bearing(  # noqa: PLR0917 - a reflex and what is known around it
-    evidence: Evidence, stamp_ns: int, prior: PoseGaussian, use: float, named: bool, model: FilterModel
+    evidence: Evidence, stamp_ns: int, prior: PoseGaussian, use: float, near: float, model: FilterModel
 ) -> Evidence:
     """Count what became of a bearing, as `weigh` counts detections.
 
@@ -197,7 +234,7 @@ def weigh_bearing(  # noqa: PLR0917 - a reflex and what is known around it
     stamp_ns : of the reflex [ns].
     prior : that the bearing was associated at.
     use : a `BearingUse`.
-    named : whether it is said which reflector it is of: then that one is near.
+    near : how much of it is one of a reflector of the map where it is rejected: 1 where it is said which one.
     model : of the whole filter.
 
     Notes
@@ -209,7 +246,6 @@ def weigh_bearing(  # noqa: PLR0917 - a reflex and what is known around it
     """
     rule: RejectionRule = model.rejection
     accepted, rejected = 1.0 if use == ACCEPTED else 0.0, 1.0 if use == REJECTED else 0.0
-    near = rejected if named else 0.0
     confirmed, against = evidence.confirmed, evidence.against
     against = max(against + (rejected - accepted / MOST_FOR) / FEWEST_AGAINST, 0.0)
     if is_doubtful(prior, rule):

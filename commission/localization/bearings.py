@@ -55,6 +55,8 @@ USE, REFLECTOR, NIS, OFF, LASTING = range(5)
 """Columns of what is known of a bearing: a `BearingUse`, index in the reflector map or -1, NIS, measured less expected
 [rad], and whether innovations of late do not average out (`lasting`), so that the supervisor stops the vehicle."""
 COLUMNS = 5
+TURNS = 2.5
+"""Turns in which a reflector that is in sight is met: a goniometer misses one now and then."""
 
 
 class BearingModel(NamedTuple):
@@ -73,6 +75,8 @@ class BearingModel(NamedTuple):
     """What its clock shows more than the vehicle's [s]."""
     first: int
     """First column of its constants in `cross`."""
+    turns_s: float
+    """Time in which a reflector that is in sight is met [s]."""
     lasting: LastingRule
     """When innovations that do not average out stop the vehicle."""
 
@@ -100,6 +104,7 @@ def bearing_model(
                 turned=-1.0 if scanner.upside_down else 1.0,
                 late=float(scanner.clock_offset),
                 first=PER_REFLECTOR * reflectors + PER_SCANNER * index,
+                turns_s=TURNS / scanner.rate,
                 lasting=lasting_rule(given, parameters.supervisor),
             )
     return None

@@ -17,9 +17,9 @@ from commission.geometry.arrays import FloatArray, read_only
 from commission.localization.rejection import Evidence
 from commission.site.parameters import BearingParameters, SupervisorParameters
 
-WEIGHT, SUM, NOISE, KNOWN, SEEN, REACH = range(6)
-"""Columns of what is remembered of a reflector's bearings: see `remember`."""
-REMEMBERED = 6
+WEIGHT, SUM, NOISE, KNOWN, SEEN, REACH, MET = range(7)
+"""Columns of what is remembered of a reflector's bearings: see `remember`; when one was accepted last [s]."""
+REMEMBERED = 7
 FEWEST = 5.0
 """Weighted bearings of a reflector from which on their mean says something."""
 HARMLESS = 0.25
@@ -121,8 +121,9 @@ def remember(  # noqa: PLR0917 - a bearing, number by number
 
     Parameters
     ----------
-    row : (REMEMBERED,) of the reflector, in and out: sum of weights l, of l times the innovation [rad], of l^2 times
-        what is new in it each time [rad^2], of l times what constants make of it [rad^2]; stamp [s], distance [m].
+    row : (REMEMBERED,) of the reflector, in and out, but for `MET`: sum of weights l, of l times the innovation [rad],
+        of l^2 times what is new in it each time [rad^2], of l times what constants make of it [rad^2]; stamp [s],
+        distance [m].
     stamp_ns : of the bearing [ns].
     innovation, variance : measured less expected [rad], and its variance S [rad^2].
     noise : the part R of S that is drawn anew each time [rad^2].

@@ -377,6 +377,44 @@ def test_bearings_that_fit_nothing_make_a_vehicle_lost_and_those_that_fit_find_i
     assert (columns.bearings[160:330, USE] == BearingUse.REJECTED).all()
 
 
+def turns(count: int, fits: tuple[bool, ...], false: int, at_rest=(0.0, 0.0, 0.0)):
+    """Modes of a vehicle at rest among three reflectors: in each turn some are met, and some things that are none."""
+    rng, setup, records = np.random.default_rng(4), dataclasses.replace(SETUP, scanners=(GONIOMETER,), tags=()), []
+    for turn in range(count):
+        bearings = [
+            expected(np.array(at_rest), GONIOMETER.mounting, place)
+            for place, is_met in zip(SETUP.reflectors.centers, fits, strict=True)
+            if is_met
+        ]
+        # Bearings of things that stand still, away from those of all reflectors.
+        free = [b for b in np.arange(-3.0, 3.0, 0.1) if all(abs(wrap(b - e)) > 0.2 for e in EXPECTED)]
+        bearings += [free[7 * (k + 1)] for k in range(false)]
+        for k, bearing in enumerate(bearings):
+            stamp = turn * 125_000_000 + k * 10_000_000
+            records += [Odometry(stamp, np.zeros(3)), Reflex(stamp, bearing + 1e-4 * rng.standard_normal())]
+    return run(RecordLog.collect(records), setup, Belief(0, np.zeros(3), np.diag((1e-6, 1e-6, 1e-6))))
+
+
+EXPECTED = [expected(np.zeros(3), GONIOMETER.mounting, place) for place in SETUP.reflectors.centers]
+
+
+@pytest.mark.parametrize("met", [(True, False, False), (False, False, True)])
+def test_a_pose_that_one_bearing_fits_while_two_fit_nothing_and_two_reflectors_are_missing_is_none(met):
+    """As where a vehicle is elsewhere in a hall of three reflectors, one of which lies in a fitting direction."""
+    columns = turns(40, met, false=2)
+    lost = int(np.argmax(columns.modes == Mode.LOST))
+    assert 0 < lost <= 3 * 15
+    assert (columns.modes[lost:] != Mode.OPERATIONAL).all()
+
+
+@pytest.mark.parametrize(
+    ("met", "false"), [((True, True, True), 2), ((True, True, False), 2), ((True, True, False), 1)]
+)
+def test_things_that_the_map_lacks_beside_reflectors_that_are_met_lose_nobody(met, false):
+    """Two of five bearings, also while one reflector is hidden."""
+    assert (turns(400, met, false).modes == Mode.OPERATIONAL).all()
+
+
 def test_a_vehicle_that_bearings_alone_do_not_find_is_told_so():
     setup = dataclasses.replace(SETUP, scanners=(GONIOMETER,), tags=())
     records = []

@@ -62,6 +62,13 @@ LOCALIZATION = (
         tests=(TESTS + "test_wall_depth.py::test_a_vehicle_that_stands_learns_from_its_first_scan_alone",),
     ),
     Mutant(
+        name="a bearing that fits nothing speaks against the pose also where no reflector is missing",
+        file=FOLDER + "bearing_cycle.py",
+        find="return missing / max(within, 1.0)",
+        replace="return 1.0",
+        tests=(TESTS + "test_bearings.py::test_things_that_the_map_lacks_beside_reflectors_that_are_met_lose_nobody",),
+    ),
+    Mutant(
         name="poses that go along are carried in the direction in which the run's own one drives",
         file=FOLDER + "several_scans.py",
         find="direction_of(rival.theta - before[2])",
