@@ -32,6 +32,7 @@ from commission.io.recordings.recorded_start import recorded_start_of
 from commission.io.recordings.recorder import (
     BEARINGS,
     DISPLACEMENTS,
+    ESTIMATE,
     METADATA,
     REFERENCES,
     TAGS,
@@ -110,6 +111,11 @@ class McapRecording(WholeRecording):
         """Return where on the vehicle the reference measures; raises FileFormatError."""
         text = self._said.get("reference")
         return BASE if text is None else reference_mount_of(self.path, text)
+
+    def holds_estimates(self) -> bool:
+        """Whether it holds what a localizer said while it was recorded; ask before it is loaded."""
+        index = self._index = self._index or McapIndex(self._file)
+        return bool(index.channels_of(ESTIMATE))
 
     def start(self) -> RecordedStart | None:
         """Return where the vehicle was said to be when the recording began; raises FileFormatError."""

@@ -14,6 +14,7 @@ import pytest
 
 from commission.errors import FileFormatError, UsageError
 from commission.io.bundled import bundled_folder
+from commission.io.interchange import ConvertOptions, convert_file
 from commission.io.live.live_run import LiveRun
 from commission.io.live.session_recorder import SessionRecorder, new_recording
 from commission.io.project_file import load_project
@@ -134,6 +135,20 @@ def test_what_the_localizer_made_of_it_stands_beside_the_raw_data(
     assert (position.x, position.y) == tuple(live.columns.means[-1, :2])
 
 
+def test_what_is_not_converted_of_a_recorded_live_drive_is_told(
+    warehouse: Project, drive: list[Record], tmp_path: Path
+) -> None:
+    recorded(warehouse, tmp_path / "live.mcap", drive)
+    for target in ("folder", "copy.mcap"):
+        notes = convert_file(tmp_path / "live.mcap", tmp_path / target, ConvertOptions())
+        assert any("estimate, detections, mode" in note for note in notes), notes
+        # What it says to type is the start of the recording.
+        assert any("--initial-pose 5.0100,4.0200,0.0020,0.0300,0.0200,0.0100" in note for note in notes), notes
+    assert not any(
+        "not converted" in note for note in convert_file(tmp_path / "copy.mcap", tmp_path / "again", ConvertOptions())
+    )
+
+
 def test_nothing_is_overwritten_and_other_endings_are_refused(warehouse: Project, tmp_path: Path) -> None:
     (tmp_path / "there.mcap").write_bytes(b"precious")
     with pytest.raises(UsageError, match="never overwritten"):
@@ -181,6 +196,7 @@ import sys
 from pathlib import Path
 from commission.io.bundled import bundled_folder
 from commission.io.live.session_recorder import SessionRecorder
+from commission.io.interchange import ConvertOptions, convert_file
 from commission.io.project_file import load_project
 from commission.simulation.scenario import records
 project = load_project(bundled_folder("maps") / "warehouse")
