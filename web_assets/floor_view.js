@@ -95,9 +95,11 @@
       length.textContent = written(metres);
       zoom.textContent = `${(1 / perPixel).toPrecision(3).replace(/(\.\d*?)0+$/, "$1").replace(/\.$/, "")} px/m`;
     }
+    // Without a minus before a zero.
+    const millimetres = (value) => (Math.round(value * 1000) / 1000 || 0).toFixed(3);
     const at = pointer && onFloor(...pointer);
     const [x0, y0] = window.commissionOrigin ?? [0, 0]; // of the scene, in the map (map_scene.py)
-    place.textContent = at ? `x ${(x0 + at[0]).toFixed(3)}   y ${(y0 + at[1]).toFixed(3)} m` : "";
+    place.textContent = at ? `x ${millimetres(x0 + at[0])}   y ${millimetres(y0 + at[1])} m` : "";
     snap.textContent = attracts;
   }
   // Who has zoomed or moved the floor keeps what was zoomed to, though the page still builds up: told until it is heard.

@@ -79,7 +79,8 @@
   }
 
   function written(value, decimals) {
-    return value === null ? "–" : value.toFixed(decimals);
+    // No minus before a zero.
+    return value === null ? "–" : (Math.round(value * 10 ** decimals) / 10 ** decimals || 0).toFixed(decimals);
   }
 
   function inOrder() {

@@ -230,11 +230,11 @@ class Quantity:
 
     def text(self, value: float) -> str:
         """Return a value as the page writes it: number, with the decimals of its step, and unit."""
-        return joined(f"{value * self.scale:.{decimals_of(self.step)}f}", self.shown_unit)
+        return joined(f"{value * self.scale:z.{decimals_of(self.step)}f}", self.shown_unit)
 
     def change_text(self, before: float, after: float) -> str:
         """Return how a value changes, `1.250 → 1.275 m`; empty: by less than the last digit."""
-        old, new = (f"{value * self.scale:.{decimals_of(self.step)}f}" for value in (before, after))
+        old, new = (f"{value * self.scale:z.{decimals_of(self.step)}f}" for value in (before, after))
         return "" if old == new else f"{old} → {joined(new, self.shown_unit)}"
 
     def brief(self, value: float) -> str:
@@ -243,7 +243,7 @@ class Quantity:
 
     def digits(self, value: float) -> str:
         """Return the number that the page shows for a value, with no digit that says nothing and none lost."""
-        return f"{self.on_page(value):.11g}"
+        return f"{self.on_page(value):z.11g}"
 
     def limits(self) -> str:
         """Say in the page's unit what may be entered, on a slider what lies between its ends; empty: any number."""

@@ -158,3 +158,11 @@ def test_rounding_for_a_file_twice_is_rounding_once_and_keeps_the_bounds(value, 
 def test_a_large_number_is_written_with_all_its_digits_and_no_exponent(value, digits, text):
     assert number_text(value, digits) == text
     assert Shown("mm", 1.0).text(value, f".{digits}g") == f"{text} mm"
+
+
+def test_no_minus_stands_before_a_zero():
+    length = Quantity(label="x", unit="m", step=0.001)
+    assert length.text(-1e-9) == "0.000 m"
+    assert length.digits(-0.0) == "0"
+    assert not length.change_text(-1e-9, 1e-9)
+    assert MILLIMETRES.text(-1e-9) == "0 mm"

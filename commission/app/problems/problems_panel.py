@@ -11,6 +11,7 @@ from commission.app.base.rows import Rows
 from commission.app.base.view import PageView
 from commission.app.problems.actions import ShowProblem
 from commission.app.problems.view import inspection_of
+from commission.site.quantity import counted_text
 from commission.studies.problems import Problem, Severity
 
 COLORS: dict[Severity, theme.Color] = {
@@ -55,15 +56,23 @@ class ProblemsPanel(BasePanel):
         self._html.content = (
             f"<ul class='c-problems' style='font-size:12px;padding:0 6px 0 20px;margin:4px 0'>{lines}</ul>"
             if problems
-            else f"<div class='c-note' style='padding:2px 6px'>{_summary(found)}</div>"
+            else f"<div class='c-note' style='padding:2px 6px'>{summary(found)}</div>"
         )
         self._clear.visible = bool(problems)
         self._rows.show([(problem.text, COLORS[problem.severity]) for problem in self._found])
 
 
-def _summary(found: tuple[Problem, ...]) -> str:
-    """Say how many problems there are."""
+def summary(found: tuple[Problem, ...]) -> str:
+    """Say how many problems there are.
+
+    Parameters
+    ----------
+    found : problems and notes of the site.
+    """
     if not found:
         return "None."
-    count = f"{len(found)} of the site" if len(found) <= MOST_SHOWN else f"{len(found)}, the first {MOST_SHOWN} shown"
-    return f"{count}; a click goes there."
+    notes = sum(problem.severity is Severity.NOTE for problem in found)
+    # As the number at the tab, which counts no notes.
+    count = ", ".join(counted_text(n, word) for n, word in ((len(found) - notes, "problem"), (notes, "note")) if n)
+    shown = f" of the site; the first {MOST_SHOWN} shown" if len(found) > MOST_SHOWN else " of the site"
+    return f"{count}{shown}; a click goes there."

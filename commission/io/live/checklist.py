@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import socket
 
 from commission.io.live.registry import LOCAL, SourceAddress
 from commission.io.live.status import SourceState, SourceStatus
+from commission.site.quantity import counted_text
 
 EVERY = ("0.0.0.0", "")  # noqa: S104 - compared with, not bound to
 
@@ -33,6 +35,8 @@ def checklist(address: SourceAddress, status: SourceStatus, own: tuple[str, ...]
         return ()
     if status.state is SourceState.FAILED:
         return (status.trouble, "disconnect and connect again; the log says where it was")
+    if status.records:
+        return _of_silence(address, status)
     is_datagram = address.kind.transport == "udp"
     if not is_datagram:
         return _of_device(address, status)
@@ -50,6 +54,17 @@ def checklist(address: SourceAddress, status: SourceStatus, own: tuple[str, ...]
     lines.append(f"the sender's port has to be {address.port}, and a firewall has to let UDP {address.port} in")
     if address.name == "sick-safety":
         lines.append("data output has to be switched on in Safety Designer; this program does not write to the scanner")
+    return tuple(lines)
+
+
+def _of_silence(address: SourceAddress, status: SourceStatus) -> tuple[str, ...]:
+    """Return what to look at where records have come, and come no more."""
+    since = f" for {status.silent_s:.0f} s" if math.isfinite(status.silent_s) else ""
+    lines = [f"{counted_text(status.records, 'record')} came, and none{since}"]
+    if status.trouble:
+        lines.append(status.trouble)
+    where = "this computer" if address.kind.transport == "udp" else f"{address.host}:{address.port}"
+    lines.append(f"is the sender switched on, and its way to {where} unbroken?")
     return tuple(lines)
 
 

@@ -192,7 +192,7 @@ def test_a_silent_source_is_shown_within_a_second_while_two_sigma_goes_on_growin
     served.until(lambda: live_of(served).sources[0].status.state is SourceState.SILENT, 3.0)
     source = live_of(served).sources[0]
     assert source.status.silent_s < 1.6
-    assert any("arrives on UDP" in line for line in source.checks)
+    assert any("records came, and none for" in line for line in source.checks)
     sigmas = []
     for _ in range(3):
         view = served.view
@@ -249,6 +249,18 @@ def test_a_checklist_says_where_the_sender_has_to_send_to() -> None:
     elsewhere = replace(address, host="10.0.0.1")
     assert "10.0.0.1 is none of these" in checklist(elsewhere, waiting, ("127.0.0.1",))
     assert checklist(address, SourceStatus(state=SourceState.RECEIVING), ()) == ()
+    silent = SourceStatus(state=SourceState.SILENT, records=2250, bytes_received=9, silent_s=12.4)
+    assert checklist(address, silent, ()) == (
+        "2250 records came, and none for 12 s",
+        "is the sender switched on, and its way to this computer unbroken?",
+    )
+    device = SourceAddress.parse("cola:192.168.0.1:2112")
+    gone = replace(silent, state=SourceState.CONNECTING, records=1, trouble="connection refused")
+    assert checklist(device, gone, ()) == (
+        "1 record came, and none for 12 s",
+        "connection refused",
+        "is the sender switched on, and its way to 192.168.0.1:2112 unbroken?",
+    )
     garbage = replace(waiting, bytes_received=90, undecodable=3, trouble="byte 0: no datagram")
     assert checklist(address, garbage, ())[1:] == (
         "90 bytes came and 3 pieces cannot be decoded",
