@@ -249,7 +249,7 @@ def test_every_number_of_the_newest_cycle_is_shown(run: RunView, project: Projec
         "Rejected, 1 s": "0.0 %",
         "Cycle time": f"{result.microseconds_per_cycle:.1f} µs, mean of the drive",
         "Position error": f"{1000.0 * math.hypot(*result.errors[newest, :2]):.1f} mm",
-        "True wheels": "along 10.0 mm/√m, across 3.0 mm/√m, heading 0.34 °/√m, heading, turning 0.57 °/√rad, "
+        "True wheels": "along 10.0 mm/√m, across 3.0 mm/√m, heading 0.34 °/√m, turning 0.57 °/√rad, "
         "along, in time 0.5 mm/√s, heading, in time 0.01 °/√s",
         "True scanner": "as the project says",
         "True reflectors": "where the map says",

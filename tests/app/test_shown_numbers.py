@@ -166,7 +166,7 @@ UNITS_NOW = {
 
 
 TRUE = {
-    "True wheels": "along 10.0 mm/√m, across 3.0 mm/√m, heading 0.34 °/√m, heading, turning 0.57 °/√rad, "
+    "True wheels": "along 10.0 mm/√m, across 3.0 mm/√m, heading 0.34 °/√m, turning 0.57 °/√rad, "
     "along, in time 0.5 mm/√s, heading, in time 0.01 °/√s, all too small 0.250 %, alone too small -0.100 %, "
     "alone too small 0.125 %, farther apart 2.000 %",
     "True scanner": "mounting x off by 3.0 mm, turned by 1.00°, range bias -5.5 mm, clock late by 4.0 ms",
