@@ -88,7 +88,9 @@ class _Piece:
         if at[-1] < SHORTEST_S:
             self._lines = np.zeros(1), np.zeros(1)
             return
-        knots = np.arange(0.0, at[-1] + AROUND_S / 2, AROUND_S / 2)
+        # Only where there are telegrams: a damaged one may be of another century.
+        steps = np.floor(at / (AROUND_S / 2))
+        knots = np.unique(np.concatenate((steps, steps + 1.0))) * (AROUND_S / 2)
         self._lines = knots, np.array([_least_at(knot, at, late) for knot in knots])
 
     def offset_at(self, device_ns: int) -> int:
@@ -102,7 +104,9 @@ def _least_at(knot: float, at: FloatArray, late: FloatArray) -> float:
     near, values = at[first:last], late[first:last]
     if len(near) < 2 or near[-1] - near[0] < SHORTEST_S:
         # At the ends, and around a pause: the nearest ones.
-        nearest = np.sort(np.argsort(np.abs(at - knot))[: round(2 * AROUND_S)])
+        count, here = round(2 * AROUND_S), int(np.searchsorted(at, knot))
+        around = np.arange(max(here - count, 0), min(here + count, len(at)))
+        nearest = np.sort(around[np.argsort(np.abs(at[around] - knot), kind="stable")[:count]])
         near, values = at[nearest], late[nearest]
     slope, height = line_below(near - knot, values)
     if abs(slope) > LARGEST_DRIFT:

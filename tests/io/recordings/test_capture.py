@@ -150,6 +150,18 @@ def test_device_clock_follows_drift_and_a_clock_that_begins_again() -> None:
     assert np.abs(off).max() < 2_000_000
 
 
+@pytest.mark.parametrize("ahead_ns", [10**13, 2**62])
+def test_device_time_of_another_century_takes_no_longer_and_moves_no_other(ahead_ns: int) -> None:
+    """Damaged, or begun again twice: of a clock the time between its telegrams may be any."""
+    clock, times = DeviceClock(), list(range(0, 100 * 10**9, 10**9))
+    pairs = [(at + ahead_ns * (at == 50 * 10**9), at + START) for at in times]
+    for at, captured in pairs:
+        clock.learn(at, captured)
+    clock.begin()
+    stamps = [clock.stamp(at, captured) - START for at, captured in pairs]
+    assert stamps[:50] + stamps[51:] == times[:50] + times[51:]
+
+
 def test_capture_without_telegrams_says_what_is_read(tmp_path: Path) -> None:
     file = made.write_pcap(tmp_path / "a.pcap", [(START, made.ip(17, made.udp(b"hello")))])
 
