@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from io import BytesIO
 from pathlib import Path
 
@@ -131,12 +131,20 @@ def test_the_dot_of_a_column_colors_the_floor_by_it(served: Served, page: OpenPa
     page.wait_until_still()
     page.wait_until_drawn()
     classes = classes_of(BY_KEY["nis"].values(figures))
-    for name, place, index in zip(figures.names, figures.places.tolist(), classes.tolist(), strict=True):
+
+    def colored(place: Sequence[float], index: int) -> bool:
         x, y = page.pixel_of(place)
+        size = page.page.viewport_size
+        if size is None or not (9 <= x <= size["width"] - 9 and 9 <= y <= size["height"] - 9):
+            return False  # the floor has not come to where "Fit" sends it
         shot = page.page.screenshot(clip={"x": x - 9, "y": y - 9, "width": 18, "height": 18})
         picture = np.asarray(Image.open(BytesIO(shot)).convert("RGB"), dtype=np.int64)
         near = np.abs(picture - np.array(palette()[index])).sum(axis=2) < 40
-        assert near.sum() > 25, name
+        return bool(near.sum() > 25)
+
+    places = list(zip(figures.places.tolist(), classes.tolist(), strict=True))
+    # The scale may be written before the scene has its colors, and before the floor begins to move.
+    served.until(lambda: all(colored(*each) for each in places))
     page.page.get_by_label("Color by NIS").click()
     served.until(lambda: served.state.part(RunState).figure == "")
 
