@@ -91,21 +91,15 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items.sort(key=lambda item: not item.path.relative_to(REPOSITORY).as_posix().startswith(LONGEST_FIRST))
 
 
-BROWSERS = ("browser, files a to l", "browser, files m to z")
-"""Groups of the tests in a browser."""
-
-
 def run_together(nodeid: str) -> str:
     """Name what one of several workers runs one after the other: the tests of a file, which share what they prepare.
 
-    The tests in a browser are two such groups, which take about as long: a test waits for its page most of the time,
-    but a browser without a graphics card takes a core for each picture. The files in which time is measured go with one
-    of them, so that they never run beside two browsers.
+    The tests in a browser share one worker with the files in which time is measured: a browser without a graphics card
+    takes the cores that a measured test counts on, and beside a second one it does not draw in the time that a person
+    would wait.
     """
     file = nodeid.partition("::")[0]
-    if file.startswith("tests/browser/"):
-        return BROWSERS[Path(file).stem.removeprefix("test_")[0] >= "m"]
-    return BROWSERS[1] if _measures_time(file) else file
+    return "browser" if file.startswith("tests/browser/") or _measures_time(file) else file
 
 
 @functools.cache

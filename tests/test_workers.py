@@ -1,4 +1,4 @@
-"""Several workers share the tests by whole files; two of them have all that need a browser or measure time."""
+"""Several workers share the tests by whole files; one has all that need a browser and all that measure time."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collections import defaultdict
 
 import pytest
 
-from tests.conftest import BROWSERS, REPOSITORY, run_together
+from tests.conftest import REPOSITORY, run_together
 
 
 def test_each_file_stays_on_one_worker_and_both_work() -> None:
@@ -32,12 +32,11 @@ def test_each_file_stays_on_one_worker_and_both_work() -> None:
 @pytest.mark.parametrize(
     ("nodeid", "group"),
     [
-        ("tests/browser/test_page.py::test_x", BROWSERS[1]),
-        ("tests/browser/test_plan.py::test_x[a/b::c]", BROWSERS[1]),
-        ("tests/browser/test_layouts.py::test_x", BROWSERS[0]),
-        ("tests/app/base/test_jobs.py::test_progress_beyond_its_range_is_clipped", BROWSERS[1]),
+        ("tests/browser/test_page.py::test_x", "browser"),
+        ("tests/browser/test_plan.py::test_x[a/b::c]", "browser"),
+        ("tests/app/base/test_jobs.py::test_progress_beyond_its_range_is_clipped", "browser"),
         ("tests/geometry/test_se2.py::test_x", "tests/geometry/test_se2.py"),
     ],
 )
-def test_what_measures_time_goes_with_one_of_two_browsers(nodeid: str, group: str) -> None:
+def test_what_measures_time_goes_with_the_browser(nodeid: str, group: str) -> None:
     assert run_together(nodeid) == group
