@@ -33,6 +33,7 @@ from commission.localization.contour import ContourScan
 from commission.localization.cycle import Cycle, held_back, supervised, with_temporary
 from commission.localization.filter_kinds import is_invariant
 from commission.localization.lasting import MET, lasts, remember, with_lasting
+from commission.localization.observation import scanner_offset
 from commission.localization.odometry import NextOdometry, reach, velocity
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.rejection import (
@@ -209,9 +210,9 @@ def share_missing(prior: PoseGaussian, stamp_ns: int, places: FloatArray, reflex
     missing / (missing + met), by definition. A bearing that fits none of the map's is of a thing that the map lacks, or
     of a reflector that is expected elsewhere: the more of those are missing, the likelier.
     """
-    model, mount = reflexes.model, reflexes.model.observation
-    c, s = math.cos(prior.theta), math.sin(prior.theta)
-    x, y = prior.x + c * mount.mount_x - s * mount.mount_y, prior.y + s * mount.mount_x + c * mount.mount_y
+    model = reflexes.model
+    offset_x, offset_y = scanner_offset(prior.theta, model.observation)
+    x, y = prior.x + offset_x, prior.y + offset_y
     missing, within = 0.0, 0.0
     for entry in range(len(places)):
         distance = math.hypot(places[entry, 0] - x, places[entry, 1] - y)

@@ -74,8 +74,9 @@ class ContourUse(IntEnum):
 ACCEPTED, REJECTED, UNMATCHED = int(ContourUse.ACCEPTED), int(ContourUse.REJECTED), int(ContourUse.UNMATCHED)
 CONTRADICTED = int(ContourUse.CONTRADICTED)
 USE, POINTS, MATCHED, THRESHOLD, COST, NIS, ROWS, MATCH_X, MATCH_Y, MATCH_THETA, ITERATIONS, SIGMA = range(12)
-DEPTH, LEARNED_DEPTH, LEARNED_INFORMATION = 12, 13, 14
-"""Columns of what is known of a scan's contours; `contour_figures` names them."""
+DEPTH, LEARNED_DEPTH, LEARNED_INFORMATION = range(12, 15)
+"""Columns of what is known of a scan's contours; `contour_figures` names them. The depth is that of the walls that it
+was matched with; learned is what `wall_depth` makes of an accepted one."""
 COLUMNS = 15
 WHOLE_POSE = 3
 """Rows of a match that tells place and heading."""

@@ -28,7 +28,6 @@ class DeviceClock:
 
     def __init__(self) -> None:
         self._pieces: list[_Piece] = []
-        self._at = 0
 
     def learn(self, device_ns: int | None, captured_ns: int) -> None:
         """Take the two times of a telegram [ns]; the device's is None where it says none."""
@@ -39,8 +38,7 @@ class DeviceClock:
         self._pieces[-1].learn(device_ns, captured_ns)
 
     def begin(self) -> None:
-        """Begin with the first telegram again."""
-        self._at = 0
+        """Begin with the first telegram again: all have been learned from."""
         for piece in self._pieces:
             piece.end()
 

@@ -17,7 +17,8 @@ from commission.app.run.playback import Playback
 from commission.app.run.sighting_layer import SightingLayer
 from commission.app.run.view import RunView
 from commission.app.run.wall_layers import WallPointLayer, WallTableLayer, table_picture
-from commission.localization.contour import MATCHED, USE, ContourUse
+from commission.app.run.wall_points import walls_told
+from commission.localization.contour import COLUMNS, DEPTH, MATCHED, USE, ContourUse
 from commission.localization.setup import LocalizerSetup
 from commission.localization.tags import TagUse
 from commission.simulation.scenario import virtual_drive
@@ -60,6 +61,9 @@ def test_beams_are_told_by_whether_a_wall_of_the_map_explains_them(server: viser
     told = dict(rows(view))
     assert told["Contours"].startswith("accepted, NIS ")
     assert told["Beams on walls"].startswith(f"{walls.figures[MATCHED]:.0f} of ")
+    assert told["Beams end"] == f"{1000.0 * walls.figures[DEPTH]:.0f} mm behind the drawn walls"
+    deep = dataclasses.replace(walls, figures=np.where(np.arange(COLUMNS) == DEPTH, 0.0426, walls.figures))
+    assert dict(walls_told(deep))["Beams end"] == "43 mm behind the drawn walls"
     points, table = WallPointLayer(server.scene), WallTableLayer(server.scene)
     points.draw(page)
     table.draw_slowly(page)
