@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from commission.compiled import compiled
+from commission.compiled import compiled, compiled_inline
 from commission.geometry.arrays import FloatArray
 
 # Newton doubles the digits per step; the limit only stops a guess that is trapped at a cusp.
@@ -64,8 +64,33 @@ def evaluate(
     u = min(max(u, knots[degree]), knots[len(knots) - degree - 1])
     span = span_at(knots, degree, u)
     homogeneous = np.zeros((3, 3))
-    window = np.empty((degree + 1, 3))
-    for order in range(min(degree, 2) + 1):
+    _blossom(knots, controls, degree, span, u, min(degree, 2), np.empty((degree + 1, 3)), homogeneous)
+    w, dw, ddw = homogeneous[0, 2], homogeneous[1, 2], homogeneous[2, 2]
+    x, y = homogeneous[0, 0] / w, homogeneous[0, 1] / w
+    dx, dy = (homogeneous[1, 0] - dw * x) / w, (homogeneous[1, 1] - dw * y) / w
+    ddx = (homogeneous[2, 0] - 2.0 * dw * dx - ddw * x) / w
+    ddy = (homogeneous[2, 1] - 2.0 * dw * dy - ddw * y) / w
+    return x, y, dx, dy, ddx, ddy
+
+
+@compiled_inline
+def _blossom(  # noqa: PLR0917 - two tables, where to look, and where to write
+    knots: FloatArray,
+    controls: FloatArray,
+    degree: int,
+    span: int,
+    u: float,
+    orders: int,
+    window: FloatArray,
+    homogeneous: FloatArray,
+) -> None:
+    """Write the homogeneous curve and its derivatives up to an order; `window` is room for degree + 1 points.
+
+    Notes
+    -----
+    d_j = (1 - a) d_(j-1) + a d_j, level by level: de Boor's algorithm.
+    """
+    for order in range(orders + 1):
         p = degree - order
         # Loops and not slices, here and below: slice assignment took five times as long to compile.
         for j in range(p + 1):
@@ -79,12 +104,6 @@ def evaluate(
                     window[j, axis] = (1.0 - share) * window[j - 1, axis] + share * window[j, axis]
         for axis in range(3):
             homogeneous[order, axis] = window[p, axis]
-    w, dw, ddw = homogeneous[0, 2], homogeneous[1, 2], homogeneous[2, 2]
-    x, y = homogeneous[0, 0] / w, homogeneous[0, 1] / w
-    dx, dy = (homogeneous[1, 0] - dw * x) / w, (homogeneous[1, 1] - dw * y) / w
-    ddx = (homogeneous[2, 0] - 2.0 * dw * dx - ddw * x) / w
-    ddy = (homogeneous[2, 1] - 2.0 * dw * dy - ddw * y) / w
-    return x, y, dx, dy, ddx, ddy
 
 
 @compiled
@@ -100,6 +119,29 @@ def evaluate_many(knots: FloatArray, controls: FloatArray, degree: int, paramete
     for i in range(len(parameters)):
         x, y, dx, dy, ddx, ddy = evaluate(knots, controls, degree, parameters[i])
         rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3], rows[i, 4], rows[i, 5] = x, y, dx, dy, ddx, ddy
+    return rows
+
+
+@compiled
+def tangents_many(knots: FloatArray, controls: FloatArray, degree: int, parameters: FloatArray) -> FloatArray:
+    """Rows [dx, dy] of `evaluate` at each of M parameters: (M, 2) array.
+
+    Parameters
+    ----------
+    knots, controls, degree : as in `evaluate`.
+    parameters : (M,) array.
+
+    Notes
+    -----
+    C' = (A' - w' C) / w: The NURBS Book, equation 4.8. Lengths need no more, and of them there are many.
+    """
+    rows, window, homogeneous = np.empty((len(parameters), 2)), np.empty((degree + 1, 3)), np.zeros((3, 3))
+    for i in range(len(parameters)):
+        u = min(max(parameters[i], knots[degree]), knots[len(knots) - degree - 1])
+        _blossom(knots, controls, degree, span_at(knots, degree, u), u, 1, window, homogeneous)
+        w, dw = homogeneous[0, 2], homogeneous[1, 2]
+        x, y = homogeneous[0, 0] / w, homogeneous[0, 1] / w
+        rows[i, 0], rows[i, 1] = (homogeneous[1, 0] - dw * x) / w, (homogeneous[1, 1] - dw * y) / w
     return rows
 
 
@@ -155,5 +197,6 @@ def warm_up() -> None:
     knots.setflags(write=False)
     controls.setflags(write=False)
     evaluate_many(knots, controls, 1, parameters)
+    tangents_many(knots, controls, 1, parameters)
     evaluate(knots, controls, 1, 0.5)
     closest_parameter(knots, controls, 1, 0.0, 0.0, 0.5)

@@ -167,8 +167,9 @@ class Spline:
         return rows.reshape((*given.shape, 6))
 
     def _speed(self, u: FloatArray) -> FloatArray:
-        rows = self._rows(u)
-        return np.hypot(rows[..., 2], rows[..., 3])
+        flat = np.ascontiguousarray(u).reshape(-1)
+        rows = spline_kernels.tangents_many(self.knots, self.controls, self.degree, flat)
+        return np.hypot(rows[:, 0], rows[:, 1]).reshape(u.shape)
 
     def _arc(self, start: FloatArray, end: FloatArray) -> FloatArray:
         """Arc length between parameters inside one piece of the table, by Gauss-Legendre quadrature."""

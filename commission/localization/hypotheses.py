@@ -10,8 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from commission.geometry.angles import difference
-from commission.geometry.arrays import BoolArray, FloatArray, read_only
+from commission.compiled import compiled
+from commission.geometry.angles import difference, wrap_scalar
+from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
 from commission.geometry.se2 import compose
 from commission.localization.hypothesis_fit import ROW, Prior, judge
 from commission.localization.missed import Sights
@@ -128,20 +129,40 @@ def _ranked(judged: FloatArray, search: Search) -> FloatArray:
     return ranked
 
 
-def each_place_once(poses: FloatArray, most: int) -> list[int]:
+def each_place_once(poses: FloatArray, most: int, part: float = 1.0) -> IntArray:
     """Return rows of poses, from the first on, that are places of their own.
 
     Parameters
     ----------
     poses : (n, 3) [m, m, rad], the likeliest first.
     most : rows at most.
+    part : of the distance and of the turn within which two are one place.
     """
-    kept: list[int] = []
-    left = np.arange(len(poses))
-    while len(left) and len(kept) < most:
-        kept.append(int(left[0]))
-        left = left[~_same(poses[left], poses[left[0]])]
-    return kept
+    kept = np.empty(min(most, len(poses)), dtype=np.int64)
+    return kept[: _of_their_own(read_only(np.ascontiguousarray(poses)), part, kept)]
+
+
+@compiled
+def _of_their_own(poses: FloatArray, part: float, kept: IntArray) -> int:
+    """Write the rows of `each_place_once`; return their number.
+
+    Notes
+    -----
+    No formula: it compares pairs.
+    """
+    count = 0
+    for row in range(len(poses)):
+        if count == len(kept):
+            break
+        is_known = False
+        for at in range(count):
+            x, y = poses[row, 0] - poses[kept[at], 0], poses[row, 1] - poses[kept[at], 1]
+            turn = abs(wrap_scalar(poses[row, 2] - poses[kept[at], 2]))
+            is_known = is_known or (math.hypot(x, y) < part * SAME_PLACE and turn < part * SAME_HEADING)
+        if not is_known:
+            kept[count] = row
+            count += 1
+    return count
 
 
 def times_in_a_row(ranked: FloatArray, before: FloatArray, track: PoseGaussian) -> float:

@@ -5,13 +5,14 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 
 import numpy as np
 
+from commission.compiled import compiled, compiled_inline
+from commission.geometry.angles import wrap_scalar
 from commission.geometry.arrays import FloatArray, read_only
-from commission.localization.observation import ObservationModel
+from commission.localization.observation import observation_at
 from commission.localization.sightings import INFLATION, noise_on_floor
 from commission.localization.start import MOST_SCORED
 from commission.localization.trail_fit import INDEPENDENT_M, INDEPENDENT_RAD, Trail
@@ -31,15 +32,20 @@ def no_trail() -> Trail:
     return Trail(read_only(np.empty((0, 8))), read_only(np.empty((0, 2))))
 
 
+@compiled
 def way_between(before: FloatArray, after: FloatArray) -> float:
     """How much new a scan tells: one for each `INDEPENDENT_M` driven and each `INDEPENDENT_RAD` turned.
 
     Parameters
     ----------
     before, after : (8,) rows of `Trail.scans`.
+
+    Notes
+    -----
+    way = distance / `INDEPENDENT_M` + |turn| / `INDEPENDENT_RAD`, by definition.
     """
     driven = math.hypot(after[1] - before[1], after[2] - before[2])
-    return driven / INDEPENDENT_M + abs(math.remainder(after[3] - before[3], 2.0 * math.pi)) / INDEPENDENT_RAD
+    return driven / INDEPENDENT_M + abs(wrap_scalar(after[3] - before[3])) / INDEPENDENT_RAD
 
 
 def lengthened(trail: Trail, scan: FloatArray, detections: FloatArray) -> Trail:
@@ -57,14 +63,28 @@ def lengthened(trail: Trail, scan: FloatArray, detections: FloatArray) -> Trail:
     newest = scan.copy()
     newest[7] = len(seen)
     scans = np.concatenate((scans, newest[np.newaxis]))
-    ways = [way_between(a, b) for a, b in itertools.pairwise(scans)]
-    to_come = np.concatenate((np.cumsum(ways[::-1])[::-1], (0.0,)))
-    kept = (scans[:, 7] > len(seen) - MOST_SEEN) & (to_come < LONGEST_WAY)
-    first = int(np.argmax(kept))
+    first = _first_kept(scans)
     begin = int(scans[first - 1, 7]) if first else 0
     scans = scans[first:].copy()
     scans[:, 7] -= begin
     return Trail(read_only(scans), read_only(seen[begin:].copy()))
+
+
+@compiled
+def _first_kept(scans: FloatArray) -> int:
+    """Oldest scan of the newest ones that are kept.
+
+    Notes
+    -----
+    No formula: it goes back from the newest one, as far as `MOST_SEEN` and `LONGEST_WAY` allow.
+    """
+    first, to_come = len(scans) - 1, 0.0
+    while first > 0:
+        to_come += way_between(scans[first - 1], scans[first])
+        if not (scans[first - 1, 7] > scans[-1, 7] - MOST_SEEN and to_come < LONGEST_WAY):
+            break
+        first -= 1
+    return first
 
 
 def newest_things(trail: Trail, models: FloatArray) -> FloatArray:
@@ -75,25 +95,54 @@ def newest_things(trail: Trail, models: FloatArray) -> FloatArray:
     trail : see `Trail`.
     models : (S, 6) see `observation_rows`.
     """
-    things: list[tuple[float, ...]] = []
-    now = trail.scans[-1]
+    things = np.empty((MOST_SCORED, 5))
+    return read_only(things[: _newest(trail, models, things)])
+
+
+@compiled
+def _newest(trail: Trail, models: FloatArray, things: FloatArray) -> int:
+    """Write the things of `newest_things`; return their number.
+
+    Notes
+    -----
+    P = P_detection + drift of odometry since then at its distance: as in `sightings`.
+    """
+    now, count = trail.scans[-1], 0
     for k in range(len(trail.scans) - 1, -1, -1):
-        scan, model = trail.scans[k], ObservationModel(*models[int(trail.scans[k, 6])].tolist())
-        x, y, theta = scan[1:4].tolist()
+        scan = trail.scans[k]
+        model = observation_at(models, int(scan[6]))
+        theta = scan[3]
         c, s = math.cos(theta), math.sin(theta)
-        x, y = x + c * model.mount_x - s * model.mount_y, y + s * model.mount_x + c * model.mount_y
-        for distance, bearing in trail.seen[int(trail.scans[k - 1, 7]) if k else 0 : int(scan[7])].tolist():
-            measured, direction = distance - model.range_bias, theta + model.mount_theta + bearing
+        x, y = scan[1] + c * model.mount_x - s * model.mount_y, scan[2] + s * model.mount_x + c * model.mount_y
+        for i in range(int(trail.scans[k - 1, 7]) if k else 0, int(scan[7])):
+            measured, direction = trail.seen[i, 0] - model.range_bias, theta + model.mount_theta + trail.seen[i, 1]
             px, py = x + measured * math.cos(direction), y + measured * math.sin(direction)
             across = INFLATION * model.bearing_variance * measured * measured
             xx, xy, yy = noise_on_floor(INFLATION * model.range_variance, across, direction)
             away2 = (px - now[1]) ** 2 + (py - now[2]) ** 2
-            drifted = float(now[4] - scan[4] + (now[5] - scan[5]) * away2) + 1e-4
-            near = sum(math.hypot(px - each[0], py - each[1]) < ONE_PLACE for each in things)
-            if near < 2 and xx + yy + 2.0 * drifted < SPREAD:
-                things.append((px, py, xx + drifted, xy, yy + drifted))
-                if len(things) == MOST_SCORED:
-                    return read_only(np.array(things))
+            drifted = now[4] - scan[4] + (now[5] - scan[5]) * away2 + 1e-4
+            if xx + yy + 2.0 * drifted >= SPREAD or _near(things, count, px, py) >= 2:
+                continue
+            things[count, 0], things[count, 1] = px, py
+            things[count, 2], things[count, 3], things[count, 4] = xx + drifted, xy, yy + drifted
+            count += 1
+            if count == len(things):
+                return count
         if now[4] - scan[4] > SPREAD:
             break
-    return read_only(np.array(things, dtype=np.float64).reshape(-1, 5))
+    return count
+
+
+@compiled_inline
+def _near(things: FloatArray, count: int, x: float, y: float) -> int:
+    """How many of the first things lie nearer than `ONE_PLACE` to a place.
+
+    Notes
+    -----
+    No formula: it counts.
+    """
+    near = 0
+    for i in range(count):
+        if math.hypot(x - things[i, 0], y - things[i, 1]) < ONE_PLACE:
+            near += 1
+    return near

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from commission.compiled import compiled, compiled_inline
-from commission.geometry.angles import wrap_scalar
+from commission.geometry.angles import TURN, wrap_scalar
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.kalman import correct, innovation, squared_distance
 from commission.localization.observation import ObservationModel, expect, observation_at, scanner_offset
@@ -127,7 +127,7 @@ def follow(  # noqa: PLR0917 - a pose, the trail and the map
         before = k
         model = _louder(observation_at(models, int(scan[6])), INFLATION)
         if since >= 0.5:
-            visible, since = _in_view(pose, model, int(scan[6]), eyes, longest, places), 0.0
+            visible, since = in_view(pose, model, int(scan[6]), eyes, longest, places), 0.0
         odds = OF_THE_MAP * _seen_area(int(scan[6]), eyes, longest) / visible
         for i in range(int(trail.scans[k - 1, 7]) if k > 0 else 0, int(scan[7])):
             rivals, total = _weigh(
@@ -268,25 +268,41 @@ def _seen_area(scanner: int, eyes: FloatArray, longest: float) -> float:
 
 
 @compiled
-def _in_view(  # noqa: PLR0917 - a pose and the map
+def in_view(  # noqa: PLR0917 - a pose and the map
     pose: PoseGaussian, model: ObservationModel, scanner: int, eyes: FloatArray, longest: float, places: FloatArray
 ) -> float:
-    """How many reflectors a scanner could see, one at least."""
+    """How many reflectors a scanner could see, one at least.
+
+    Parameters
+    ----------
+    pose : of base, map frame.
+    model : of the scanner.
+    scanner : its index.
+    eyes : see `SearchMap`.
+    longest : range up to which anything is seen [m].
+    places : the map, see `ReflectorIndex`.
+
+    Notes
+    -----
+    No angle is taken of any reflector: v is within a turn w <= pi from u where u x v >= 0 and v x w >= 0, and within
+    a wider one where either is; derived. Stretches of the field of view of one scanner do not overlap.
+    """
     ox, oy = scanner_offset(pose.theta, model)
-    count = 0
-    for entry in range(len(places)):
-        dx, dy = places[entry, 0] - pose.x - ox, places[entry, 1] - pose.y - oy
-        square = dx * dx + dy * dy
-        if square > longest * longest:
+    x, y, count = pose.x + ox, pose.y + oy, 0
+    for e in range(len(eyes)):
+        if int(eyes[e, 0]) != scanner:
             continue
-        bearing = math.atan2(dy, dx) - pose.theta - model.mount_theta
-        for e in range(len(eyes)):
-            if int(eyes[e, 0]) != scanner or not eyes[e, 3] ** 2 <= square <= eyes[e, 4] ** 2:
-                continue
-            turn = bearing - eyes[e, 1]
-            if turn - 2.0 * math.pi * math.floor(turn / (2.0 * math.pi)) <= eyes[e, 2]:
+        first, width = pose.theta + model.mount_theta + eyes[e, 1], eyes[e, 2]
+        c, s, end_c, end_s = math.cos(first), math.sin(first), math.cos(first + width), math.sin(first + width)
+        nearest, farthest = eyes[e, 3] ** 2, min(eyes[e, 4], longest) ** 2
+        is_narrow, is_round = width <= math.pi, width >= TURN
+        for entry in range(len(places)):
+            dx, dy = places[entry, 0] - x, places[entry, 1] - y
+            square = dx * dx + dy * dy
+            behind_first, before_end = c * dy - s * dx >= 0.0, dx * end_s - dy * end_c >= 0.0
+            within = (behind_first and before_end) if is_narrow else (behind_first or before_end or is_round)
+            if within and nearest <= square <= farthest:
                 count += 1
-                break
     return max(float(count), 1.0)
 
 

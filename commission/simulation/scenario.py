@@ -25,7 +25,7 @@ from commission.simulation.people import Crowd, WalkableFloor
 from commission.simulation.scan import VirtualScanner
 from commission.simulation.tags import tag_frames
 from commission.site.disturbances import ScannerError
-from commission.site.path import legs_of
+from commission.site.path import Leg, legs_of
 from commission.site.project import Project
 from commission.site.record_log import RecordLog
 from commission.site.records import ORDER_WITHIN_A_STAMP, Odometry, Record, ReferencePose, Reflex, Scan
@@ -49,7 +49,9 @@ class DriveStart:
     """(3,) 1-sigma of x [m], y [m] and heading [rad], map frame."""
 
 
-def start_of(project: Project, route_name: str, options: DriveOptions = DEFAULTS) -> DriveStart:
+def start_of(
+    project: Project, route_name: str, options: DriveOptions = DEFAULTS, *, legs: Sequence[Leg] | None = None
+) -> DriveStart:
     """Return where a drive starts and how far the true start may lie from it.
 
     Parameters
@@ -57,6 +59,7 @@ def start_of(project: Project, route_name: str, options: DriveOptions = DEFAULTS
     project : site and vehicle.
     route_name : which route.
     options : sigmas of the start, and limits of the motion.
+    legs : those of the route, where they are known.
 
     Raises
     ------
@@ -64,7 +67,7 @@ def start_of(project: Project, route_name: str, options: DriveOptions = DEFAULTS
         there is no such route.
     """
     route = project.route(route_name)
-    pose = legs_of(route, project.vehicle, options.limits)[0].start_pose
+    pose = (legs_of(route, project.vehicle, options.limits) if legs is None else legs)[0].start_pose
     return DriveStart(pose, frozen(options.start_sigma, (3,), "start sigmas"))
 
 

@@ -20,7 +20,6 @@ from commission.simulation.people import WalkableFloor
 from commission.simulation.random_faults import DrawnFaults, carried, draw_faults
 from commission.simulation.scenario import start_of, virtual_drive
 from commission.simulation.scenario import warm_up as scenario_warm_up
-from commission.site.path import legs_of
 from commission.site.record_log import RecordLog
 from commission.studies.monte_carlo_figures import (
     CycleCounts,
@@ -31,7 +30,7 @@ from commission.studies.monte_carlo_figures import (
     floor_notes,
 )
 from commission.studies.run import RunInput, RunResult, judged_run
-from commission.studies.shadow_drives import ShadowWorld, shadow_drive
+from commission.studies.shadow_drives import ShadowWorld, legs_along, shadow_drive
 from commission.studies.start import Start, StartOrigin, belief_at
 from commission.studies.workers import Threads, Workers
 
@@ -79,7 +78,7 @@ def monte_carlo(
         inputs=inputs,
         drives=tuple(sorted(drives, key=lambda each: each.number)),
         counts=counts,
-        notes=floor_notes(inputs.project, inputs.rates),
+        notes=floor_notes(inputs.project, inputs.rates, given.floor),
     )
 
 
@@ -90,15 +89,14 @@ def warm_up() -> None:
 
 
 def _prepared(inputs: MonteCarloInput) -> _Prepared:
-    project, options = inputs.project, DriveOptions()
-    setup = LocalizerSetup.of(project)
+    project, setup = inputs.project, LocalizerSetup.of(inputs.project)
+    legs = legs_along(project, tuple(dict.fromkeys(inputs.routes)))
     starts, durations = {}, {}
-    for name in dict.fromkeys(inputs.routes):
-        start = start_of(project, name)
+    for name, along in legs.items():
+        start = start_of(project, name, legs=along)
         starts[name] = (start.pose, start.sigmas)
-        legs = legs_of(project.route(name), project.vehicle, options.limits)
-        durations[name] = sum(float(np.sum(leg.step / np.maximum(leg.speeds, 0.01))) for leg in legs)
-    world = None if inputs.by_beams else ShadowWorld.of(project, setup, tuple(starts))
+        durations[name] = sum(float(np.sum(leg.step / np.maximum(leg.speeds, 0.01))) for leg in along)
+    world = None if inputs.by_beams else ShadowWorld.of(project, setup, tuple(legs), legs=legs)
     floor = WalkableFloor.of(project) if inputs.rates.false else None
     return _Prepared(inputs=inputs, setup=setup, world=world, floor=floor, starts=starts, durations=durations)
 

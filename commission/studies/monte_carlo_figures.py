@@ -270,13 +270,14 @@ def quantiles_of(counts: IntArray) -> FloatArray:
     return ERROR_EDGES[1:][np.searchsorted(np.cumsum(counts), np.maximum(needed, 1))]
 
 
-def floor_notes(project: Project, rates: FaultRates) -> tuple[str, ...]:
+def floor_notes(project: Project, rates: FaultRates, floor: WalkableFloor | None = None) -> tuple[str, ...]:
     """Say where people and false things would be, where that is not the free floor of a map.
 
     Parameters
     ----------
     project : the site.
     rates : how often each fault happens.
+    floor : of the project, where it is at hand.
     """
     people = walking(project, rates).people
     what = " and ".join(name for name, wanted in (("people", people), ("false things", rates.false)) if wanted)
@@ -284,6 +285,6 @@ def floor_notes(project: Project, rates: FaultRates) -> tuple[str, ...]:
         return ()
     if project.floor_map is None:
         return (f"there is no floor map: {what} are on an open field around the site, and no wall hides anything",)
-    if not len(WalkableFloor.of(project).cells):
+    if not len((floor or WalkableFloor.of(project)).cells):
         return (f"the floor map has no free floor that is wide enough to walk on: {what} do not occur",)
     return ()

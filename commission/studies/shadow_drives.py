@@ -77,7 +77,13 @@ class ShadowWorld:
     """What is driven along each route."""
 
     @staticmethod
-    def of(project: Project, setup: LocalizerSetup, routes: tuple[str, ...]) -> ShadowWorld:
+    def of(
+        project: Project,
+        setup: LocalizerSetup,
+        routes: tuple[str, ...],
+        *,
+        legs: Mapping[str, tuple[Leg, ...]] | None = None,
+    ) -> ShadowWorld:
         """Cast the shadows of a site, and fill the libraries.
 
         Parameters
@@ -85,7 +91,10 @@ class ShadowWorld:
         project : its reflectors, shiny objects, walls and scanners.
         setup : the detector.
         routes : names of the routes that are driven.
+        legs : what is driven along each of them, where it is known.
         """
+        if legs is None:
+            legs = legs_along(project, routes)
         reflectors = with_shiny(project)
         kinds = {kind_of(each) for each in reflectors.reflectors} | {(FALSE_RADIUS, False, False)}
         rows = {kind: row for row, kind in enumerate(sorted(kinds))}
@@ -96,8 +105,19 @@ class ShadowWorld:
                 make_library(tuple(rows), scanner, setup, index) for index, scanner in enumerate(project.scanners)
             ),
             kinds=rows,
-            legs={name: tuple(legs_of(project.route(name), project.vehicle, DriveOptions().limits)) for name in routes},
+            legs=legs,
         )
+
+
+def legs_along(project: Project, routes: tuple[str, ...]) -> dict[str, tuple[Leg, ...]]:
+    """Return what is driven along each of some routes, by their names: to find it takes longer than to drive it.
+
+    Raises
+    ------
+    UsageError
+        an unknown route.
+    """
+    return {name: legs_of(project.route(name), project.vehicle, DriveOptions().limits) for name in routes}
 
 
 def with_shiny(project: Project) -> ReflectorMap:

@@ -11,14 +11,15 @@ import pytest
 from commission.geometry import se2
 from commission.localization.contradiction import contradiction
 from commission.localization.estimate import Mode
-from commission.localization.hypotheses import hypotheses_of
+from commission.localization.hypotheses import each_place_once, hypotheses_of
 from commission.localization.localizer import Localizer
+from commission.localization.observation import range_bearing
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.search_map import search_map
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import FilterState, state_unlocated
 from commission.localization.trail import lengthened, no_trail
-from commission.localization.trail_fit import MET, Trail, follow
+from commission.localization.trail_fit import MET, Trail, follow, in_view
 from commission.localization.whole_run import run, state_before
 from commission.site.parameters import ObservationParameters, Parameters, SupervisorParameters
 from commission.site.records import Detections
@@ -200,3 +201,35 @@ def test_a_trail_keeps_the_newest_of_the_way_and_no_scan_that_saw_nothing() -> N
     assert trail.seen[0, 0] == trail.scans[0, 0]
     assert trail.seen[-1, 0] == trail.scans[-1, 0]
     assert trail.scans[-1, 7] == len(trail.seen)
+
+
+def test_reflectors_in_view_are_those_whose_bearing_and_range_are_within_the_limits() -> None:
+    setup, rng = setup_of(5, count=200), np.random.default_rng(5)
+    around, model = search_map(setup), setup.observations[0]
+    for case in range(60):
+        first, width = rng.uniform(-math.pi, math.pi), (rng.uniform(0.1, math.pi), rng.uniform(math.pi, 6.2))[case % 2]
+        nearest, farthest, longest = rng.uniform(0.1, 2.0), rng.uniform(5.0, 20.0), rng.uniform(5.0, 20.0)
+        width = 2.0 * math.pi if case % 10 == 9 else width
+        # The second one is of another scanner.
+        eyes = np.array([(0, first, width, nearest, farthest), (1, -math.pi, 2.0 * math.pi, 0.0, 99.0)])
+        pose = PoseGaussian(*rng.uniform(-8.0, 8.0, 2), rng.uniform(-9.0, 9.0), 1.0, 0.0, 0.0, 1.0, 0.0, 1.0)
+        view = range_bearing(np.array(pose[:3]), CAMERA.mounting, around.places[:, :2])
+        turned = np.mod(view[:, 1] - first, 2.0 * math.pi)
+        near = (view[:, 0] >= nearest) & (view[:, 0] <= min(farthest, longest))
+        expected = max(1, int(np.sum(near & (turned <= width))))
+        assert in_view(pose, model, 0, eyes, longest, around.places) == expected, case
+
+
+def test_poses_of_one_place_are_led_along_once_the_likeliest_of_them() -> None:
+    rng = np.random.default_rng(7)
+    poses = np.column_stack((rng.uniform(0.0, 1.5, (400, 2)), rng.uniform(-math.pi, math.pi, 400)))
+    for part in (1.0, 0.25):
+        plain: list[int] = []
+        for row, (x, y, theta) in enumerate(poses):
+            apart = [math.hypot(x - poses[k, 0], y - poses[k, 1]) for k in plain]
+            turns = [abs(math.remainder(theta - poses[k, 2], 2.0 * math.pi)) for k in plain]
+            if not any(a < 0.4 * part and t < 0.15 * part for a, t in zip(apart, turns, strict=True)):
+                plain.append(row)
+        assert each_place_once(poses, 400, part).tolist() == plain
+        assert each_place_once(poses, 7, part).tolist() == plain[:7]
+    assert each_place_once(poses[:0], 5).tolist() == []

@@ -147,9 +147,25 @@ LOCALIZATION = (
     Mutant(
         name="a trail keeps all of the way, however long ago it was seen",
         file=FOLDER + "trail.py",
-        find="(to_come < LONGEST_WAY)",
-        replace="(to_come < math.inf)",
+        find="and to_come < LONGEST_WAY",
+        replace="",
         tests=(TESTS + "test_trail.py::test_a_trail_keeps_the_newest_of_the_way_and_no_scan_that_saw_nothing",),
+    ),
+    Mutant(
+        name="a scanner with a wide field of view sees as if it were a narrow one",
+        file=FOLDER + "trail_fit.py",
+        find="(behind_first or before_end or is_round)",
+        replace="(behind_first and before_end)",
+        tests=(
+            TESTS + "test_trail.py::test_reflectors_in_view_are_those_whose_bearing_and_range_are_within_the_limits",
+        ),
+    ),
+    Mutant(
+        name="poses that are alike are each led along",
+        file=FOLDER + "hypotheses.py",
+        find="turn < part * SAME_HEADING",
+        replace="turn < SAME_HEADING",
+        tests=(TESTS + "test_trail.py::test_poses_of_one_place_are_led_along_once_the_likeliest_of_them",),
     ),
     Mutant(
         name="a vehicle at rest takes every scan of a trail for a new one",
