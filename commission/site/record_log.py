@@ -13,6 +13,7 @@ from commission.site.bearing_log import NO_BEARINGS, BearingLog
 from commission.site.record_store import ScanLog, ScanStore, stacked
 from commission.site.recorded_mounting import RecordedMounting
 from commission.site.recorded_start import RecordedStart
+from commission.site.recorded_sweep import RecordedSweep
 from commission.site.records import (
     ORDER_WITHIN_A_STAMP,
     Detections,
@@ -69,6 +70,8 @@ class RecordLog:
     """Where the vehicle was said to be when the recording began; None: nobody says."""
     mountings: tuple[RecordedMounting, ...] = ()
     """Where the recording says that its scanners are mounted."""
+    sweeps: tuple[RecordedSweep, ...] = ()
+    """How the recording says that its scanners turn."""
     notes: tuple[str, ...] = ()
     """What a reader mended or left out, one line each; none where the recording is as it should be."""
     scan_order: NDArray[np.int32] = field(init=False, repr=False)

@@ -44,6 +44,8 @@ MOUNTED_APART = 0.03
 """Distance between two mountings of one scanner from which it is told [m]."""
 TURNED_APART = math.radians(1.0)
 """The same of their headings [rad]."""
+SWEPT_APART_S = 0.002
+"""Difference of two durations of a sweep from which it is told [s]; a tenth of the longer one where that is more."""
 _SEEN = ("detections", "scans")
 _FULL_SHARE = 0.99
 _TOLD_GAPS = 3
@@ -111,6 +113,7 @@ def plausibility(inputs: PlausibilityInput, progress: Progress = silent) -> tupl
         ("reference", _reference),
         ("names of scanners", _unknown_scanners),
         ("mountings", _mountings),
+        ("sweeps", _sweeps),
     )
     findings: list[Finding] = []
     for done, (name, check) in enumerate(checks):
@@ -454,6 +457,35 @@ def _mountings(inputs: PlausibilityInput) -> Iterator[Finding]:
             probably=f"one of the two is wrong, or {said.base} is not the base whose motion the odometry tells",
             remedy="correct the mounting in the project, or see to it that both count from the same point",
         )
+
+
+def _sweeps(inputs: PlausibilityInput) -> Iterator[Finding]:
+    """Find scanners that turn otherwise than the project says, or in no time that can be."""
+    for said in inputs.log.sweeps:
+        scanner = _scanner_of(inputs, said.scanner)
+        stamps = next(each.stamps_ns for each in inputs.log.scans if inputs.log.scanners[each.scanner] == said.scanner)
+        period = _period_s(stamps) if len(stamps) > 1 else math.inf
+        if said.duration > 1.1 * period:
+            yield Finding(
+                found=f"a scan of {said.scanner} takes {said.duration * 1e3:.4g} ms from beam to beam by its"
+                f" time_increment, and the next one comes after {period * 1e3:.4g} ms",
+                probably="the driver fills in another time",
+                remedy="set how long the sweep takes by the scanner's manual; nothing was taken from the recording",
+            )
+            continue
+        if scanner is None:
+            continue
+        apart = abs(said.duration - scanner.sweep_duration)
+        turns_back = scanner.sweep_duration > 0.0 and said.direction != scanner.sweep_direction
+        if apart > max(SWEPT_APART_S, 0.1 * max(said.duration, scanner.sweep_duration)) or turns_back:
+            ways = {1: "counter-clockwise", -1: "clockwise"}
+            yield Finding(
+                found=f"a scan of {said.scanner} takes {said.duration * 1e3:.4g} ms from the first to the last beam,"
+                f" {ways[said.direction]}, by its time_increment; the project says"
+                f" {scanner.sweep_duration * 1e3:.4g} ms, {ways[scanner.sweep_direction]}",
+                probably="at 1 m/s each ms is 1 mm, and a turning vehicle bends the scan",
+                remedy="set sweep_duration and sweep_direction of the scanner in the project, or check the driver's",
+            )
 
 
 def _reference(inputs: PlausibilityInput) -> Iterator[Finding]:

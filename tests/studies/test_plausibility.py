@@ -12,6 +12,7 @@ import pytest
 from commission.errors import JobCancelled
 from commission.site.record_log import RecordLog
 from commission.site.recorded_mounting import RecordedMounting
+from commission.site.recorded_sweep import RecordedSweep
 from commission.studies.plausibility import Finding, PlausibilityInput, plausibility
 from commission.studies.recording_overview import channels
 from commission.studies.start import start_of
@@ -269,3 +270,26 @@ def test_a_mounting_of_the_recording_that_is_not_the_project_s_is_told(
     )
     found = judged(dataclasses.replace(drive(), mountings=(said,)))
     assert [each.found.startswith("scanner is mounted at [") for each in found] == [True] * told
+
+
+@pytest.mark.parametrize(
+    ("duration", "direction", "told"),
+    [
+        (0.020, 1, ""),
+        (0.0215, 1, ""),
+        (0.0225, 1, "takes 22.5 ms from the first to the last beam, counter-clockwise, by its time_increment"),
+        (0.020, -1, "takes 20 ms from the first to the last beam, clockwise, by its time_increment; the project says"),
+        (0.150, 1, "takes 150 ms from beam to beam by its time_increment, and the next one comes after 100 ms"),
+    ],
+)
+def test_a_sweep_of_the_recording_that_is_not_the_project_s_or_cannot_be_is_told(
+    duration: float, direction: int, told: str
+) -> None:
+    scanner = dataclasses.replace(PROJECT.scanners[0], sweep_duration=0.020)
+    project = dataclasses.replace(PROJECT, scanners=(scanner,))
+    said = RecordedSweep(scanner="scanner", duration=duration, direction=direction)
+    log = dataclasses.replace(with_scans(intensities=MIXED), sweeps=(said,))
+
+    found = [each.found for each in plausibility(PlausibilityInput.of(project, log)) if "time_increment" in each.found]
+
+    assert [told in each for each in found] == [True] * bool(told)

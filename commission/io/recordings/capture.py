@@ -5,7 +5,7 @@ Each sender is a scanner. A telegram that cannot be decoded is counted and left 
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, OrderedDict, deque
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -20,6 +20,11 @@ from commission.io.recordings.whole import WholeRecording
 from commission.site.record_log import RecordLog
 from commission.site.records import Scan
 from commission.site.scanner import ONLY_NAME
+
+_RECENT = 64
+"""Scans of a scanner among which one that it sends to a second receiver is found again."""
+_FLOWS = 64
+"""Connections that are looked through for telegrams at once: a capture of a whole plant has thousands."""
 
 
 class Capture(WholeRecording):
@@ -79,22 +84,41 @@ class Capture(WholeRecording):
             return None
 
     def _timed(self, told: Counter[str]) -> Iterator[tuple[str, Timed]]:
-        """Sender and scan of every telegram, with its times."""
-        decoders = {name: _DECODERS[self._kinds[name]](name, told) for name in self._named}
-        for payload in payloads(self.path, told, decoders.keys()):
-            for found in decoders[payload.sender].take(payload.data, payload.stamp_ns):
-                yield payload.sender, found
+        """Sender and scan of every telegram, with its times; what a scanner sends to several, once."""
+        decoders: dict[tuple[str, str], Assembly] = {}
+        latest: dict[tuple[str, str], int] = {}
+        taken: dict[str, deque[tuple[int, str]]] = {name: deque(maxlen=_RECENT) for name in self._named}
+        for payload in payloads(self.path, told, self._named.keys()):
+            name = payload.sender
+            # Each connection is a stream of its own: a scanner serves a vehicle and a setup tool at once.
+            receiver = payload.receiver if payload.is_stream else ""
+            flow = name, receiver
+            if flow not in decoders:
+                decoders[flow] = _DECODERS[self._kinds[name]](name, told)
+            for device, captured, make in decoders[flow].take(payload.data, payload.stamp_ns):
+                if device is not None and any(device == at and receiver != to for at, to in taken[name]):
+                    told[f"telegrams of {name} went to a second receiver, too, and are taken once"] += 1
+                    continue
+                # A clock that stands says nothing.
+                stands = device is not None and device == latest.get(flow)
+                if device is not None:
+                    latest[flow] = device
+                    taken[name].append((device, receiver))
+                yield name, (None if stands else device, captured, make)
 
 
 def _senders(path: Path, told: Counter[str]) -> Iterator[tuple[str, str]]:
     """Address of each sender of telegrams that are read, and the name of their kind."""
     known: dict[str, str] = {}
-    begins: dict[str, bytes] = {}
+    begins: OrderedDict[tuple[str, str], bytes] = OrderedDict()
     for payload in payloads(path, told):
         if payload.sender in known:
             continue
         if payload.is_stream:
-            begin = begins[payload.sender] = (begins.get(payload.sender, b"") + payload.data)[-70_000:]
+            flow = payload.sender, payload.receiver
+            begin = begins[flow] = (begins.pop(flow, b"") + payload.data)[-70_000:]
+            if len(begins) > _FLOWS:
+                begins.popitem(last=False)
             kind = "CoLa" if b"sSN LMDscandata " in begin else "NAV350" if assembly.NAV_ANSWER in begin else ""
         elif payload.data.startswith(safety.MAGIC):
             kind = "safety scanner"

@@ -116,6 +116,11 @@ def choose(path: Path, topics: Sequence[Topic], options: ChannelOptions) -> Chos
     )
 
 
+def left_out(topics: Sequence[Topic], role: Role) -> str:
+    """Return the topics that could be of a role and are taken only where they are named; empty where there are none."""
+    return ", ".join(topic.told for topic in topics if topic.role is role and topic.count != 0)
+
+
 def _split(word: str) -> tuple[Role, str, str]:
     """Role, name of a scanner (or nothing) and topic of an option."""
     key, sign, topic = word.partition("=")

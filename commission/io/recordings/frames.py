@@ -12,7 +12,7 @@ from commission.io.recordings.ros_messages import transform_of
 from commission.site.recorded_mounting import RecordedMounting
 
 BASES = ("base_link", "base_footprint", "base", "base_frame")
-"""Frames of a vehicle, the preferred one first (REP 105)."""
+"""Frames of a vehicle (REP 105), whatever stands before them: `robot1/base_link`."""
 _DEEPEST = 32
 _MOVED = 1e-6
 _LEVEL = 1e-9
@@ -47,7 +47,7 @@ class Frames:
         for _ in range(_DEEPEST):
             if frame == own:
                 return _mounted(scanner, frame, T_frame_scanner)
-            if nearest is None and frame in BASES:
+            if nearest is None and frame.rpartition("/")[2] in BASES:
                 # Taken unless what the odometry moves is further up: `base_footprint` often is.
                 nearest = _mounted(scanner, frame, T_frame_scanner)
             step = self._parent.get(frame)

@@ -18,7 +18,7 @@ from commission.io.recordings import ros_encoding as ros
 from commission.io.recordings.bag_writer import ABOUT, TEXT
 from commission.io.recordings.mcap_recording import McapRecording
 from commission.io.recordings.mcap_writer import McapWriter
-from commission.io.recordings.ros_source import RosbagsSource, open_bag
+from commission.io.recordings.ros_source import open_bag
 from commission.site.record_log import RecordLog
 
 _CHUNK_BYTES = 4_000_000
@@ -55,15 +55,12 @@ class OwnBag(McapRecording):
     @staticmethod
     def recognizes(path: Path) -> bool:
         """Whether a bag is such a one, by its topics; raises FileFormatError where it is damaged."""
-        bag = open_bag(path)
-        return isinstance(bag, RosbagsSource) and any(
-            topic.name == ABOUT and topic.type == TEXT for topic in bag.topics
-        )
+        return any(topic.name == ABOUT and topic.type == TEXT for topic in open_bag(path).topics)
 
 
 def _copied(path: Path, copy: Path) -> tuple[str, ...]:
     """Write what is needed of a bag into an MCAP file; returns what was noticed about the bag."""
-    bag = RosbagsSource(path)
+    bag = open_bag(path)
     about = next(iter(bag.messages({ABOUT})), None)
     try:
         said = {} if about is None else json.loads(about.value.data)

@@ -1,6 +1,6 @@
 """Packets of pcap and pcapng captures: UDP datagrams whole, TCP streams in order. It knows no protocol above them.
 
-Formats: draft-ietf-opsawg-pcap and -pcapng. Ethernet (with VLANs), raw IP, loopback and Linux cooked captures.
+Formats: draft-ietf-opsawg-pcap and -pcapng. What stands before IP is told by `link_layers`.
 """
 
 from __future__ import annotations
@@ -14,25 +14,29 @@ from typing import IO
 
 from commission.errors import FileFormatError
 from commission.io.reading import cannot_read
+from commission.io.recordings.link_layers import network_packet
 from commission.site.quantity import STAMP_LIMIT
 
 PCAP_MAGICS = {
-    b"\xd4\xc3\xb2\xa1": ("<", 1_000),
-    b"\xa1\xb2\xc3\xd4": (">", 1_000),
-    b"\x4d\x3c\xb2\xa1": ("<", 1),
-    b"\xa1\xb2\x3c\x4d": (">", 1),
+    b"\xd4\xc3\xb2\xa1": ("<", 1_000, 0),
+    b"\xa1\xb2\xc3\xd4": (">", 1_000, 0),
+    b"\x4d\x3c\xb2\xa1": ("<", 1, 0),
+    b"\xa1\xb2\x3c\x4d": (">", 1, 0),
+    b"\x34\xcd\xb2\xa1": ("<", 1_000, 8),
+    b"\xa1\xb2\xcd\x34": (">", 1_000, 8),
 }
-"""First bytes of a pcap: order of its bytes, nanoseconds of the unit below a second."""
+"""First bytes of a pcap: order of its bytes, nanoseconds of the unit below a second, and bytes that stand before each
+packet besides its header (those of routers whose kernel was patched)."""
 PCAPNG_MAGIC = b"\x0a\x0d\x0d\x0a"
 PACKET_LIMIT = 1_000_000
 """Bytes of a packet or block."""
 _OPEN_FRAGMENTS = 64
 _WAITING_SEGMENTS = 256
-_LINK_BYTES = {0: 4, 1: 14, 101: 0, 108: 4, 113: 16, 276: 20}
-"""Bytes before IP by the kind of link: loopback, Ethernet, raw, OpenBSD loopback, Linux cooked 1 and 2."""
 _TCP, _UDP = 6, 17
 _PATIENCE_NS = 30_000_000_000
 """Time in which the parts of a datagram arrive (RFC 791: 15 s and more); later its number is another datagram's."""
+_AGAIN_NS = 1_000_000_000
+"""Time in which a part of a datagram that is whole already is one that was captured twice [ns]."""
 
 
 _SIMPLE, _ENHANCED, _OBSOLETE = 3, 6, 2
@@ -99,7 +103,7 @@ def payloads(path: Path, told: Counter[str] | None = None, senders: Collection[s
         if abs(captured) >= STAMP_LIMIT:
             told["packets of the capture have a time that cannot be, and are left out"] += 1
             continue
-        found = fragments.datagram(captured, _network(link, packet, told))
+        found = fragments.datagram(captured, network_packet(link, packet, told))
         if found is None:
             continue
         stamp, protocol, source, target, data = found
@@ -138,19 +142,21 @@ def packets(path: Path, told: Counter[str] | None = None) -> Iterator[tuple[int,
         raise cannot_read(path, error) from error
 
 
-def _pcap(path: Path, file: IO[bytes], kind: tuple[str, int], told: Counter[str]) -> Iterator[tuple[int, int, bytes]]:
-    order, unit = kind
+def _pcap(
+    path: Path, file: IO[bytes], kind: tuple[str, int, int], told: Counter[str]
+) -> Iterator[tuple[int, int, bytes]]:
+    order, unit, more = kind
     header = file.read(24)
     if len(header) < 24:
         _tell_cut(file, 0, told)
         return
     link = struct.unpack_from(f"{order}I", header, 20)[0] & 0xFFFF
-    while header := file.read(16):
+    while header := file.read(16 + more):
         begin = file.tell() - len(header)
-        if len(header) < 16:
+        if len(header) < 16 + more:
             _tell_cut(file, begin, told)
             return
-        seconds, fraction, length, _ = struct.unpack(f"{order}IIII", header)
+        seconds, fraction, length, _ = struct.unpack_from(f"{order}IIII", header)
         _check(path, file.tell(), length)
         packet = file.read(length)
         if len(packet) < length:
@@ -230,24 +236,6 @@ def _check(path: Path, offset: int, length: int) -> None:
         raise FileFormatError(path, f"byte {offset}", f"a packet of {length} bytes", f"{PACKET_LIMIT} at most")
 
 
-def _network(link: int, packet: bytes, told: Counter[str]) -> bytes:
-    """IPv4 packet in a packet of a link; empty where it is another one."""
-    begin = _LINK_BYTES.get(link)
-    if begin is None:
-        told[f"packets are of link type {link}, which is not read (Ethernet is 1)"] += 1
-        return b""
-    if link == 1:
-        # IEEE 802.1Q: four bytes for each virtual network before the kind of what follows.
-        while packet[begin - 2 : begin] in (b"\x81\x00", b"\x88\xa8"):
-            begin += 4
-        if packet[begin - 2 : begin] not in (b"\x08\x00", b"\x86\xdd"):
-            return b""
-    if len(packet) <= begin or packet[begin] >> 4 != 4:
-        told["packets are of IPv6, which is not read"] += len(packet) > begin and packet[begin] >> 4 == 6
-        return b""
-    return packet[begin:]
-
-
 class _Fragments:
     """Joins IPv4 packets that were sent in parts."""
 
@@ -255,6 +243,8 @@ class _Fragments:
         self._told = told
         self._hosts = hosts
         self._open: OrderedDict[bytes, tuple[int, dict[int, bytes], list[int]]] = OrderedDict()
+        self._whole: OrderedDict[bytes, int] = OrderedDict()
+        """When those that were whole last were so [ns]: a mirrored port shows each packet twice."""
 
     def datagram(self, stamp_ns: int, ip: bytes) -> tuple[int, int, str, str, bytes] | None:
         """Stamp [ns], protocol, sender, receiver and content, once they are whole."""
@@ -273,6 +263,8 @@ class _Fragments:
         if not offset and not more:
             return stamp_ns, ip[9], source, target, data
         key = ip[9:10] + ip[12:20] + number.to_bytes(2, "big")
+        if abs(stamp_ns - self._whole.get(key, -_PATIENCE_NS)) < _AGAIN_NS:
+            return None
         if key in self._open and abs(stamp_ns - self._open[key][0]) > _PATIENCE_NS:
             self._lose(key)
         first, parts, size = self._open.setdefault(key, (stamp_ns, {}, []))
@@ -284,6 +276,9 @@ class _Fragments:
         if not size or sum(map(len, parts.values())) < size[0]:
             return None
         self._open.pop(key, None)
+        self._whole[key] = stamp_ns
+        while len(self._whole) > _OPEN_FRAGMENTS:
+            self._whole.popitem(last=False)
         joined = b"".join(parts[at] for at in sorted(parts))
         return (first, ip[9], source, target, joined) if len(joined) == size[0] else None
 

@@ -13,13 +13,14 @@ import numpy as np
 
 from commission.errors import FileFormatError
 from commission.io.recordings import ros_messages as ros
-from commission.io.recordings.channels import NO_OPTIONS, ChannelOptions, Chosen, Role, Topic, choose
+from commission.io.recordings.channels import NO_OPTIONS, ChannelOptions, Chosen, Role, Topic, choose, left_out
 from commission.io.recordings.collector import Collector, MotionKind
 from commission.io.recordings.frames import Frames
 from commission.io.recordings.ros_source import BagMessage, is_bag, open_bag
 from commission.io.recordings.whole import WholeRecording
 from commission.site.record_log import RecordLog
 from commission.site.recorded_mounting import RecordedMounting
+from commission.site.recorded_sweep import RecordedSweep
 from commission.site.scanner import ONLY_NAME
 
 
@@ -35,6 +36,9 @@ class RosBag(WholeRecording):
         unasked = [topic for topic in found if ros.is_taken_unasked(topic)]
         named = {word.partition("=")[2] for word in options.channels}
         self.chosen = choose(path, unasked + [topic for topic in found if topic.name in named], options)
+        self._far = [topic for topic in found if topic not in unasked]
+        if self.chosen.odometry is None and not any(word.startswith(Role.ODOMETRY) for word in options.channels):
+            self.chosen = replace(self.chosen, odometry=self._moving_transforms())
         self._check()
         self.scanners = tuple(sorted(self.chosen.scanners.values())) or (ONLY_NAME,)
 
@@ -55,9 +59,17 @@ class RosBag(WholeRecording):
         try:
             reading = _Reading(self.chosen, self.scanners, collector, self.options)
             notes = self._read(reading)
-            return replace(collector.log(notes), mountings=reading.mountings())
+            return replace(collector.log(notes), mountings=reading.mountings(), sweeps=reading.sweeps())
         finally:
             collector.close()
+
+    def _moving_transforms(self) -> Topic | None:
+        """Topic whose transforms move the vehicle in the frame of its odometry; None where there is none."""
+        topics = {topic.name: topic for topic in self._far if topic.type in ros.TF_TYPES}
+        for message in self._bag.messages(topics) if topics else ():
+            if any(ros.is_odometry(each) for each in message.value.transforms):
+                return topics[message.topic]
+        return None
 
     def _motion_kind(self, odometry: Topic) -> MotionKind:
         kind = ros.MOTION_KINDS[odometry.type]
@@ -104,6 +116,9 @@ class RosBag(WholeRecording):
         for role, topic in ((Role.ODOMETRY, self.chosen.odometry), (Role.REFERENCE, self.chosen.reference)):
             if topic is not None:
                 yield f"the {role} is {topic.name} ({topic.type})"
+        far = [topic for topic in self._far if topic.type not in ros.TF_TYPES]
+        if self.chosen.odometry is None and (could := left_out(far, Role.ODOMETRY)):
+            yield f"these are taken for odometry only where they are named, --channel odometry=TOPIC: {could}"
 
 
 class _Reading:
@@ -124,28 +139,49 @@ class _Reading:
         self._frame_of: dict[str, str] = {}
         """Frame of each scanner, by its name."""
         self._base = ""
+        self._moved = ""
+        """Frame that transforms move, where they are the odometry."""
+        self._sweeps: dict[str, float] = {}
 
     def take(self, message: BagMessage, kind: str) -> None:
         """Hand a message to the collector."""
         if kind in ros.TF_TYPES:
             for each in message.value.transforms:
                 self.frames.add(each)
+                self._take_transform(message, each)
             return
-        stamp, is_own = ros.stamp_of(message.value.header, message.log_time_ns)
+        stamp, is_own = ros.stamp_of(getattr(message.value, "header", None), message.log_time_ns)
         if not is_own:
             self._unstamped[message.topic] += 1
         if message.topic in self._scanner_of:
             self._take_scan(message, kind, stamp)
         odometry, reference = self.chosen.odometry, self.chosen.reference
         if odometry is not None and message.topic == odometry.name:
-            self._base = self._base or str(getattr(message.value, "child_frame_id", ""))
+            self._base = self._base or ros.base_frame(message.value, kind)
             row = ros.motion_of(message.value, kind, self.options.wheels)
             if row is None:
-                self.collector.told[f"messages of {message.topic} without those wheels are left out"] += 1
+                joints = ", ".join(map(str, list(message.value.name)[:8])) or "none"
+                why = f"without both of the wheels that --wheels names (its joints: {joints})"
+                self.collector.told[f"messages of {message.topic} {why} are left out"] += 1
             else:
                 self.collector.add_motion(stamp, row)
         if reference is not None and message.topic == reference.name:
             self.collector.add_reference(stamp, *ros.pose_of(message.value))
+
+    def _take_transform(self, message: BagMessage, stamped: Any) -> None:
+        """Take where odometry has the vehicle, where nothing else in the bag says it."""
+        odometry = self.chosen.odometry
+        if odometry is None or odometry.name != message.topic or not ros.is_odometry(stamped):
+            return
+        moved = _frame_of(stamped.child_frame_id)
+        self._moved = self._base = self._moved or moved
+        if moved != self._moved:
+            self.collector.told[f"transforms of {moved} in {_frame(stamped.header)} are of another vehicle"] += 1
+            return
+        stamp, is_own = ros.stamp_of(stamped.header, message.log_time_ns)
+        if not is_own:
+            self._unstamped[message.topic] += 1
+        self.collector.add_motion(stamp, ros.planar_pose_of(stamped.transform))
 
     def _take_scan(self, message: BagMessage, kind: str, stamp: int) -> None:
         scanner = self._scanner_of[message.topic]
@@ -158,7 +194,9 @@ class _Reading:
             farthest = float(message.value.range_max)
             self._beyond.setdefault(message.topic, (farthest, typical))
             self._all_beyond[message.topic] += 1
-        self._frame_of[self.collector.scanners[scanner]] = _frame(message.value.header)
+        name = self.collector.scanners[scanner]
+        self._frame_of[name] = _frame(message.value.header)
+        self._sweeps.setdefault(name, ros.sweep_of(message.value))
         if scan.intensities is None:
             some = 0 < len(message.value.intensities) != len(message.value.ranges)
             what = f"{len(message.value.intensities)} intensities of {len(message.value.ranges)} beams" if some else ""
@@ -184,6 +222,18 @@ class _Reading:
         found = (self.frames.mounting(name, frame, self._base) for name, frame in self._frame_of.items())
         return tuple(each for each in found if each is not None)
 
+    def sweeps(self) -> tuple[RecordedSweep, ...]:
+        """How the scanners turn whose messages say it."""
+        return tuple(
+            RecordedSweep(scanner=name, duration=abs(swept), direction=1 if swept > 0.0 else -1)
+            for name, swept in self._sweeps.items()
+            if swept
+        )
+
 
 def _frame(header: Any) -> str:
-    return str(header.frame_id).strip("/")
+    return _frame_of(header.frame_id)
+
+
+def _frame_of(name: Any) -> str:
+    return str(name).strip("/")

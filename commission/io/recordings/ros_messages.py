@@ -20,11 +20,19 @@ from commission.site.records import Scan
 
 SCAN_TYPES = ("sensor_msgs/msg/LaserScan", "sensor_msgs/msg/MultiEchoLaserScan")
 TF_TYPES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
+TWIST = "geometry_msgs/msg/Twist"
+ODOM_FRAME = "odom"
+"""Frame in which odometry counts (REP 105), whatever stands before it: `robot1/odom`."""
+_FAR_AWAY = 4
+"""Rank of what is read when it is named only: commands and goals are not what was measured."""
 _ODOMETRY_RANKS = {
     "nav_msgs/msg/Odometry": 1,
     "geometry_msgs/msg/TwistWithCovarianceStamped": 2,
     "geometry_msgs/msg/TwistStamped": 2,
     "sensor_msgs/msg/JointState": 3,
+    # It has no stamp, and is a command nearly always.
+    TWIST: _FAR_AWAY,
+    **dict.fromkeys(TF_TYPES, _FAR_AWAY),
 }
 _REFERENCE_RANKS = {"geometry_msgs/msg/PoseWithCovarianceStamped": 1, "geometry_msgs/msg/PoseStamped": 1}
 MOTION_KINDS = {
@@ -32,9 +40,9 @@ MOTION_KINDS = {
     "geometry_msgs/msg/TwistWithCovarianceStamped": MotionKind.VELOCITIES,
     "geometry_msgs/msg/TwistStamped": MotionKind.VELOCITIES,
     "sensor_msgs/msg/JointState": MotionKind.WHEEL_ANGLES,
+    TWIST: MotionKind.VELOCITIES,
+    **dict.fromkeys(TF_TYPES, MotionKind.POSES),
 }
-_FAR_AWAY = 4
-"""Rank of what is read when it is named only: commands and goals are not what was measured."""
 _NOT_MEASURED = ("cmd", "command", "goal", "initialpose", "initial_pose", "desired", "target")
 
 
@@ -68,7 +76,9 @@ def is_taken_unasked(topic: Topic) -> bool:
 
 
 def stamp_of(header: Any, log_time_ns: int) -> tuple[int, bool]:
-    """Stamp of a message [ns], and whether it is its own: where the header has none, the time of recording stands."""
+    """Stamp of a message [ns], and whether it is its own: where it has no header or no stamp, that of the recording."""
+    if header is None:
+        return log_time_ns, False
     stamp = int(header.stamp.sec) * 1_000_000_000 + int(header.stamp.nanosec)
     return (stamp, True) if 0 < stamp < STAMP_LIMIT else (log_time_ns, False)
 
@@ -174,8 +184,40 @@ def motion_of(message: Any, kind: str, wheels: Wheels | None) -> tuple[float, ..
         return x, y, 0.0 if math.isnan(theta) else theta, twist.linear.x, twist.linear.y, twist.angular.z
     if kind == "sensor_msgs/msg/JointState":
         return None if wheels is None else _wheel_turning(message, wheels)
-    twist = message.twist if hasattr(message.twist, "linear") else message.twist.twist
+    if kind == TWIST:
+        twist = message
+    else:
+        twist = message.twist if hasattr(message.twist, "linear") else message.twist.twist
     return twist.linear.x, twist.linear.y, twist.angular.z
+
+
+def base_frame(message: Any, kind: str) -> str:
+    """Return the frame of the vehicle whose motion a message tells; empty where it does not say.
+
+    Parameters
+    ----------
+    message, kind : decoded, and the name of its type.
+    """
+    if kind in ("geometry_msgs/msg/TwistStamped", "geometry_msgs/msg/TwistWithCovarianceStamped"):
+        return str(message.header.frame_id)
+    return str(getattr(message, "child_frame_id", ""))
+
+
+def is_odometry(stamped: Any) -> bool:
+    """Whether a TransformStamped says where odometry has the vehicle."""
+    return str(stamped.header.frame_id).rpartition("/")[2] == ODOM_FRAME
+
+
+def planar_pose_of(transform: Any) -> tuple[float, float, float]:
+    """Position x, y [m] and heading [rad] of the child of a transform in its parent."""
+    theta = yaw_of(transform.rotation)
+    return float(transform.translation.x), float(transform.translation.y), 0.0 if math.isnan(theta) else theta
+
+
+def sweep_of(message: Any) -> float:
+    """Time from the first to the last beam of a scan as it says it [s]; negative where the scanner turns clockwise."""
+    passed = float(message.time_increment) * (len(message.ranges) - 1)
+    return math.copysign(1.0, float(message.angle_increment)) * passed if math.isfinite(passed) else 0.0
 
 
 def has_wheel_angles(message: Any) -> bool:

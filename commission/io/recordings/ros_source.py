@@ -9,23 +9,26 @@ import shutil
 import struct
 import tempfile
 import weakref
-from collections.abc import Collection, Generator, Iterator
+from collections.abc import Callable, Collection, Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from commission.errors import FileFormatError, reason_of
 from commission.io.reading import cannot_read
 from commission.io.recordings.bag_parts import METADATA, files_of, missing_parts, unmerged
-from commission.io.recordings.mcap_reader import MAGIC, RECORD_LIMIT, McapChannel, McapFile
+from commission.io.recordings.mcap_reader import MAGIC, RECORD_LIMIT, McapChannel, McapFile, Message
+from commission.io.recordings.packed_bag import ZSTD_MAGIC, packed_files, unpacked_folder
+from commission.io.recordings.ros1_file import Ros1File
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
 
 ROS1_MAGIC = b"#ROSBAG V2.0"
 SQLITE_MAGIC = b"SQLite format 3\0"
-ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
+_Made = TypeVar("_Made")
+_MAGICS = (MAGIC, ROS1_MAGIC, SQLITE_MAGIC)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +67,10 @@ class BagSource(Protocol):
         """Deliver the messages of some topics as they were written; raises FileFormatError."""
         ...
 
+    def raw_messages(self, topics: Collection[str]) -> Iterator[tuple[str, int, bytes]]:
+        """Deliver topic, time of recording [ns] and bytes, as ROS 2 has them, of messages; raises FileFormatError."""
+        ...
+
     @property
     def notes(self) -> tuple[str, ...]:
         """What was noticed on the way, after the last message."""
@@ -73,24 +80,78 @@ class BagSource(Protocol):
 def is_bag(path: Path) -> bool:
     """Whether a file or folder is a ROS bag, by its first bytes (a folder by its metadata or its files)."""
     if path.is_dir():
-        return (path / METADATA).is_file() or bool(files_of(path, ".mcap") or files_of(path, ".db3"))
+        plain = (path / METADATA).is_file() or bool(files_of(path, ".mcap") or files_of(path, ".db3"))
+        return plain or is_packed(path)
     with path.open("rb") as file:
         begin = file.read(len(SQLITE_MAGIC))
-    return begin.startswith((MAGIC, ROS1_MAGIC, SQLITE_MAGIC))
+    return begin.startswith(_MAGICS) or is_packed(path)
+
+
+def is_packed(path: Path) -> bool:
+    """Whether a bag is packed as a whole, and no metadata says so."""
+    if path.is_dir() and ((path / METADATA).is_file() or files_of(path, ".mcap", ".db3")):
+        return False
+    return bool(packed_files(path, _MAGICS))
 
 
 def open_bag(path: Path) -> BagSource:
     """Open a bag; raises FileFormatError where it is damaged or of a version that is not read."""
+    if is_packed(path):
+        return PackedSource(path)
     if path.is_dir():
         files = files_of(path, ".mcap")
         return McapSource(path, files) if files else RosbagsSource(path)
-    with path.open("rb") as file:
-        is_mcap = file.read(len(MAGIC)) == MAGIC
-    return McapSource(path, [path]) if is_mcap else RosbagsSource(path)
+    if _begins_with(path, MAGIC):
+        return McapSource(path, [path])
+    try:
+        return RosbagsSource(path)
+    except FileFormatError:
+        # Without its index a bag of ROS 1 is read from its begin.
+        whole = McapSource(path, [path]) if _begins_with(path, ROS1_MAGIC) else None
+        if whole is None or not whole.topics:
+            raise
+        return whole
+
+
+class PackedSource:
+    """A bag that is packed as a whole: what is in it is read."""
+
+    def __init__(self, path: Path) -> None:
+        """Unpack it."""
+        self.path = path
+        files = packed_files(path, _MAGICS)
+        folder, self._cut = unpacked_folder(self, path, files)
+        single = folder / files[0].name[: -len(files[0].suffix)]
+        with self._named():
+            self._bag = open_bag(folder if path.is_dir() else single)
+        self.topics = self._bag.topics
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was noticed on the way."""
+        return (*self._cut, *self._bag.notes)
+
+    def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:
+        """Deliver the messages of some topics as they were written; raises FileFormatError."""
+        with self._named():
+            yield from self._bag.messages(topics)
+
+    def raw_messages(self, topics: Collection[str]) -> Iterator[tuple[str, int, bytes]]:
+        """Deliver topic, time of recording [ns] and bytes, as ROS 2 has them, of messages; raises FileFormatError."""
+        with self._named():
+            yield from self._bag.raw_messages(topics)
+
+    @contextmanager
+    def _named(self) -> Generator[None]:
+        """Name the bag where an error names what was unpacked."""
+        try:
+            yield
+        except FileFormatError as error:
+            raise FileFormatError(self.path, error.where, error.problem, error.remedy) from error
 
 
 class McapSource:
-    """One or several MCAP files that follow each other."""
+    """One or several MCAP files that follow each other, or a bag of ROS 1 without its index."""
 
     def __init__(self, path: Path, files: list[Path]) -> None:
         """Read what the files say about their channels; one without a summary is read through."""
@@ -101,7 +162,7 @@ class McapSource:
         self._typestores: dict[tuple[str, str, str], Typestore] = {}
         found: dict[str, tuple[str, int | None]] = {}
         for file in files:
-            mcap = McapFile(file)
+            mcap = _file_of(file)
             counts: dict[str, int] = {}
             if mcap.read_summary():
                 for number, channel in mcap.channels.items():
@@ -122,28 +183,50 @@ class McapSource:
 
     def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:
         """Deliver the messages of some topics as they were written; raises FileFormatError."""
+        return self._each(topics, self._decoded)
+
+    def raw_messages(self, topics: Collection[str]) -> Iterator[tuple[str, int, bytes]]:
+        """Deliver topic, time of recording [ns] and bytes, as ROS 2 has them, of messages; raises FileFormatError."""
+        store = ros2_types()
+
+        def raw(message: Message) -> tuple[str, int, bytes]:
+            kind, data = ros2_type(message.channel.schema), unpacked_message(message.data)
+            if message.channel.encoding == "ros1":
+                if kind not in store.fielddefs:
+                    learn_type(store, kind, message.channel.definition)
+                data = bytes(store.ros1_to_cdr(data, kind))
+            return message.channel.topic, message.log_time_ns, data
+
+        return self._each(topics, raw)
+
+    def _each(self, topics: Collection[str], make: Callable[[Message], _Made]) -> Iterator[_Made]:
+        """Deliver what is made of each message of some topics."""
         self._cut = []
         for file in self.files:
-            mcap = McapFile(file)
+            mcap = _file_of(file)
             with _told(file):
                 for message in mcap.messages():
                     if message.channel.topic in topics:
-                        value = self._decoded(message.channel, message.data)
-                        yield BagMessage(message.channel.topic, message.log_time_ns, value)
+                        yield make(message)
             if mcap.is_cut:
                 self._cut.append(f"{file.name} was cut while it was recorded; it is read up to there")
 
-    def _decoded(self, channel: McapChannel, data: bytes) -> Any:
-        data = unpacked_message(data)
+    def _decoded(self, message: Message) -> BagMessage:
+        channel, data = message.channel, unpacked_message(message.data)
         store = self._typestore(channel)
         kind = ros2_type(channel.schema)
-        return store.deserialize_ros1(data, kind) if channel.encoding == "ros1" else store.deserialize_cdr(data, kind)
+        read = store.deserialize_ros1 if channel.encoding == "ros1" else store.deserialize_cdr
+        return BagMessage(channel.topic, message.log_time_ns, read(data, kind))
 
     def _typestore(self, channel: McapChannel) -> Typestore:
         key = channel.schema, channel.schema_encoding, channel.definition
         if key not in self._typestores:
             self._typestores[key] = _typestore_of(channel)
         return self._typestores[key]
+
+
+def _file_of(path: Path) -> McapFile | Ros1File:
+    return Ros1File(path) if _begins_with(path, ROS1_MAGIC) else McapFile(path)
 
 
 def _typestore_of(channel: McapChannel) -> Typestore:

@@ -26,12 +26,14 @@ Message = tuple[str, str, int, Callable[[Any], Any]]
 
 
 def write_bag(path: Path, messages: Iterable[Message], *, packed: str = "") -> Path:
-    """Write a bag of the kind that the path's ending says, packed by FILE or MESSAGE; returns where it is."""
+    """Write a bag of the kind that the path's ending says, packed by FILE or MESSAGE (ROS 1: BZ2 or LZ4)."""
     path.parent.mkdir(exist_ok=True)
     is_ros1 = path.suffix == ".bag"
     store = ROS1 if is_ros1 else ROS2
     if is_ros1:
         writer: Any = Writer1(path)
+        if packed:
+            writer.set_compression(Writer1.CompressionFormat[packed])
     else:
         path = path.with_suffix("")
         kind = StoragePlugin.MCAP if path.name.endswith("mcap") else StoragePlugin.SQLITE3
@@ -62,14 +64,16 @@ def scan(
     *,
     intensities: list[float] | None = None,
     frame: str = "laser",
+    angles: tuple[float, float] = (-0.5, 0.25),
+    time_increment: float = 0.0,
 ) -> Message:
     def make(store: Any) -> Any:
         return store.types["sensor_msgs/msg/LaserScan"](
             header=header(store, stamp, frame),
-            angle_min=-0.5,
-            angle_max=0.5,
-            angle_increment=0.25,
-            time_increment=0.0,
+            angle_min=angles[0],
+            angle_max=angles[0] + angles[1] * (len(ranges) - 1),
+            angle_increment=angles[1],
+            time_increment=time_increment,
             scan_time=0.1,
             range_min=0.1,
             range_max=30.0,
@@ -144,6 +148,11 @@ def twist_stamped(stamp: int, twist: tuple[float, float, float], topic: str = "/
         )
 
     return topic, "geometry_msgs/msg/TwistStamped", stamp, make
+
+
+def twist(stamp: int, velocity: tuple[float, float, float], topic: str = "/cmd_vel") -> Message:
+    """It has no stamp but that of its recording."""
+    return topic, "geometry_msgs/msg/Twist", stamp, lambda store: _twist(store, *velocity)
 
 
 def joint_state(stamp: int, names: list[str], positions: list[float], speeds: list[float]) -> Message:

@@ -121,8 +121,9 @@ def test_loading_twice_reads_the_same(tmp_path: Path) -> None:
     assert_same(recording.load().records(), recording.load().records())
 
 
-@pytest.mark.parametrize("ending", BAGS)
-@pytest.mark.parametrize("kept", [0.02, 0.3, 0.7, 0.99])
+@pytest.mark.parametrize(
+    ("ending", "kept"), [(".bag", 0.02), (".bag", 0.3), (".db3", 0.02), (".db3", 0.3), (".db3", 0.7), (".db3", 0.99)]
+)
 def test_bag_that_is_cut_is_an_error_in_one_line(tmp_path: Path, ending: str, kept: float) -> None:
     path = tmp_path / f"drive{ending}"
     write_records(path, steps(), scanners=NAMES)
@@ -133,6 +134,20 @@ def test_bag_that_is_cut_is_an_error_in_one_line(tmp_path: Path, ending: str, ke
 
     assert str(told.value).startswith(str(path))
     assert "\n" not in str(told.value)
+
+
+def test_bag_of_ros_1_that_is_cut_gives_what_was_complete_to_the_last_bit(tmp_path: Path) -> None:
+    records = steps(2_000)
+    path = tmp_path / "drive.bag"
+    write_records(path, records, scanners=NAMES)
+    path.write_bytes(path.read_bytes()[: int(0.7 * path.stat().st_size)])
+
+    log = load_log(path)
+
+    found = list(log.records())
+    assert log.notes == ("drive.bag was cut while it was recorded; it is read up to there",)
+    assert 0.3 * len(records) < len(found) < len(records)
+    assert_same(found, records[: len(found)])
 
 
 def test_time_before_1970_is_refused_where_ros_1_has_none_and_nothing_is_left(tmp_path: Path) -> None:

@@ -92,4 +92,22 @@ IO = (
         replace="self.is_still = device_ns > self._last_ns and",
         tests=(TESTS + "live/test_device_clocks.py::test_a_clock_that_stands_still_is_none",),
     ),
+    Mutant(
+        name="two clients of a scanner read as one stream",
+        file=FOLDER + "recordings/capture.py",
+        find='receiver = payload.receiver if payload.is_stream else ""',
+        replace='receiver = ""',
+        tests=(TESTS + "recordings/test_odd_captures.py::test_scanner_that_serves_two_clients_at_once_is_read_once",),
+    ),
+    Mutant(
+        name="any transform taken for odometry",
+        file=FOLDER + "recordings/ros_messages.py",
+        find='return str(stamped.header.frame_id).rpartition("/")[2] == ODOM_FRAME',
+        replace="return True",
+        tests=(
+            TESTS
+            + "recordings/test_odd_bags.py::"
+            + "test_vehicle_whose_odometry_is_in_transforms_only_is_moved_by_them",
+        ),
+    ),
 )
