@@ -11,8 +11,6 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
-import numpy as np
-
 from commission.errors import FileFormatError, UsageError
 from commission.io import mesh
 from commission.io.atomic import staged
@@ -26,10 +24,10 @@ from commission.io.map_server import read_floor_map, write_floor_map
 from commission.io.overwriting import refuse_files
 from commission.io.project_copy import refuse_to_replace
 from commission.io.project_file import FILE_NAME, load_project, project_file, save_project
-from commission.io.recordings.base import is_recording, open_recording
+from commission.io.recordings.base import is_recording
 from commission.io.recordings.channels import NO_OPTIONS, ChannelOptions
-from commission.io.recordings.mcap_recording import McapRecording
-from commission.io.recordings.writers import refuse_to_write, write_records
+from commission.io.recordings.conversion import convert_recording
+from commission.io.recordings.writers import refuse_to_write
 from commission.io.reflector_tables import write_reflectors
 from commission.io.route_edges import RouteImport
 from commission.io.smap import FIELDS, read_smap
@@ -102,14 +100,6 @@ _SUFFIXES = {
 }
 
 
-NO_ESTIMATES = (
-    "what the localizer said while it was recorded (estimate, detections, mode) is not converted; the file read "
-    "keeps it, and `commission localize` makes it anew"
-)
-NO_START = (
-    "where the vehicle was when the recording began is not converted: localize the one that is written with "
-    "--initial-pose {}"
-)
 _AS_CSV = "a recording as a CSV folder (odometry.csv with detections.csv or scans.npz)"
 _AS_MODEL = "the model as .stl, .obj, .glb or .ply"
 _UNREAD = {
@@ -326,16 +316,7 @@ def _from_smap(source: Path, target: Path, wanted: Kind, options: ConvertOptions
 
 
 def _from_recording(source: Path, target: Path, _: Kind, options: ConvertOptions) -> tuple[str, ...]:
-    recording = open_recording(source, options.recording)
-    # Before it is loaded: a recording lets go of its index then.
-    left_out = (NO_ESTIMATES,) if isinstance(recording, McapRecording) and recording.holds_estimates() else ()
-    log = recording.load()
-    write_records(target, log.records(), log.truth, scanners=log.scanners, reference_mount=log.reference_mount)
-    if log.start is not None:
-        sigmas = np.sqrt(np.diagonal(log.start.covariance))
-        given = "auto" if log.start.sought else ",".join(f"{value:.4f}" for value in (*log.start.pose, *sigmas))
-        left_out = (*left_out, NO_START.format(given))
-    return (*log.notes, *left_out)
+    return convert_recording(source, target, options.recording)
 
 
 def _written_reflectors(

@@ -6,6 +6,8 @@ Scans stay in the file. Any other MCAP is a bag (`ros_source`), and so is this o
 from __future__ import annotations
 
 import json
+import struct
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -26,11 +28,12 @@ from commission.io.recordings.mcap_columns import (
     read_columns,
 )
 from commission.io.recordings.mcap_index import McapIndex
-from commission.io.recordings.mcap_reader import MAGIC
+from commission.io.recordings.mcap_reader import MAGIC, Message
 from commission.io.recordings.mcap_scans import McapScans, ScanPlaces
 from commission.io.recordings.recorded_start import recorded_start_of
 from commission.io.recordings.recorder import (
     BEARINGS,
+    BESIDE,
     DISPLACEMENTS,
     ESTIMATE,
     METADATA,
@@ -54,6 +57,8 @@ from commission.site.scanner import is_name
 from commission.site.tag_log import TagLog
 from commission.site.truth import Truth
 
+_MESSAGE = struct.Struct("<QHIQ")
+"""Begin of a message behind its kind: bytes, channel, count, time of recording; that of sending follows."""
 _BEGIN = 400
 """Bytes in which the file says whose it is."""
 
@@ -116,6 +121,26 @@ class McapRecording(WholeRecording):
         """Whether it holds what a localizer said while it was recorded; ask before it is loaded."""
         index = self._index = self._index or McapIndex(self._file)
         return bool(index.channels_of(ESTIMATE))
+
+    def beside(self) -> Iterator[Message]:
+        """Deliver what stands beside the records, as it was written, in memory of a chunk and of its places."""
+        index = McapIndex(self._file)
+        numbers = [number for topic in BESIDE for number in index.channels_of(topic)]
+        places = [index.places[number] for number in numbers]
+        index.places.clear()
+        if not places:
+            return
+        of = np.repeat(numbers, [len(each.chunks) for each in places])
+        chunks = np.concatenate([each.chunks for each in places])
+        offsets = np.concatenate([each.offsets for each in places])
+        for row in np.lexsort((offsets, chunks)):
+            begin, content = int(offsets[row]), index.content(int(chunks[row]))
+            head = content[begin + 1 : begin + 1 + _MESSAGE.size]
+            size, _, _, log_time_ns = _MESSAGE.unpack(head) if len(head) == _MESSAGE.size else (0, 0, 0, 0)
+            if size < 22 or begin + 9 + size > len(content):
+                raise index.error(begin, f"a message of {size} bytes", "one of 22 or more, within its chunk")
+            data = content[begin + 1 + _MESSAGE.size + 8 : begin + 9 + size]
+            yield Message(index.announced.channels[int(of[row])], log_time_ns, data)
 
     def start(self) -> RecordedStart | None:
         """Return where the vehicle was said to be when the recording began; raises FileFormatError."""

@@ -18,6 +18,7 @@ from commission.io.recordings import ros_encoding as ros
 from commission.io.recordings.bag_writer import ABOUT, TEXT
 from commission.io.recordings.mcap_recording import McapRecording
 from commission.io.recordings.mcap_writer import McapWriter
+from commission.io.recordings.recorder import BESIDE
 from commission.io.recordings.ros_source import open_bag
 from commission.site.record_log import RecordLog
 
@@ -71,6 +72,7 @@ def _copied(path: Path, copy: Path) -> tuple[str, ...]:
         raise FileFormatError(path, ABOUT, f"says nothing that is known ({error})", "as it was written") from error
     types = {topic.name: topic.type for topic in bag.topics}
     wanted = {name for name, kind in types.items() if kind == ros.LASER_SCAN or kind in ros.OWN_FIELDS}
+    wanted |= {name for name, kind in BESIDE.items() if types.get(name) == kind}
     try:
         with copy.open("wb") as file:
             writer = McapWriter(copy, file, chunk_bytes=_CHUNK_BYTES, chunk_ns=600_000_000_000)

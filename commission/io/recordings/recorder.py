@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Sequence
+import struct
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import IO
@@ -20,6 +21,7 @@ from commission.geometry import se2
 from commission.io.atomic import atomic_file, cannot_write
 from commission.io.recordings import ros_encoding as ros
 from commission.io.recordings.bag_writer import MessageWriter, atomic_bag
+from commission.io.recordings.mcap_reader import Message
 from commission.io.recordings.mcap_writer import McapWriter
 from commission.io.recordings.recorded_start import recorded_start_text
 from commission.io.recordings.reference_file import reference_mount_text
@@ -39,6 +41,14 @@ DISPLACEMENTS, REFERENCES = "/commission/displacement", "/commission/reference"
 ESTIMATE, POINTS, MODE = "/commission/estimate", "/commission/detections", "/commission/mode"
 TAGS, BEARINGS = "/commission/tags", "/commission/bearings"
 _ODOMETRY, _REFERENCE, _TF, _TF_STATIC = "/odom", "/reference", "/tf", "/tf_static"
+BESIDE = {
+    ESTIMATE: ros.POSE_WITH_COVARIANCE,
+    POINTS: ros.POINTS,
+    MODE: ros.TEXT,
+    _TF: ros.TRANSFORMS,
+    _TF_STATIC: ros.TRANSFORMS,
+}
+"""Topics that stand beside the records, and their types: what the localizer says, and where viewers draw scans."""
 _CHUNK_BYTES = 4_000_000
 """Bytes of a chunk, at most."""
 _LONG_S = 600.0
@@ -161,6 +171,42 @@ class Recorder:
             self._write(MODE, ros.TEXT, stamp, ros.text(mode))
             self._mode = mode
 
+    def append_beside(self, message: Message) -> None:
+        """Append what stands beside the records of another file, byte by byte; what is not in `BESIDE` is left out.
+
+        Raises
+        ------
+        FileFormatError
+            the disk is full, or the format cannot hold the message.
+        """
+        topic = message.channel.topic
+        if BESIDE.get(topic) != message.channel.schema:
+            return
+        try:
+            self._write(topic, message.channel.schema, message.log_time_ns, message.data)
+        except (ValueError, LookupError, struct.error, AssertionError) as error:
+            found = f"cannot hold a message of {topic} ({error})"
+            raise FileFormatError(self.path, "", found, f"a {message.channel.schema} as it was recorded") from error
+
+    def append_all(self, records: Iterable[Record], beside: Iterable[Message] = ()) -> None:
+        """Append records, and among them by their times what stands beside those of another file.
+
+        Parameters
+        ----------
+        records : in the order of their stamps.
+        beside : see `append_beside`.
+        """
+        waiting = iter(beside)
+        first = next(waiting, None)
+        for record in records:
+            while first is not None and first.log_time_ns < record.stamp_ns:
+                self.append_beside(first)
+                first = next(waiting, None)
+            self.append(record)
+        while first is not None:
+            self.append_beside(first)
+            first = next(waiting, None)
+
     def flush(self) -> None:
         """Write what waits for its second to be over."""
         self._writer.flush()
@@ -230,6 +276,8 @@ def write_mcap(
     *,
     scanners: tuple[str, ...] = (ONLY_NAME,),
     reference_mount: ReferenceMount = BASE,
+    start: RecordedStart | None = None,
+    beside: Iterable[Message] = (),
 ) -> None:
     """Write a whole recording as an MCAP file, which replaces the one that is there once it is complete.
 
@@ -240,6 +288,8 @@ def write_mcap(
     truth : the constants of a virtual drive.
     scanners : names of the scanners that records have indices of.
     reference_mount : where the reference measures.
+    start : where the vehicle was said to be before the first record.
+    beside : what stands beside the records of another file, as it lies there.
 
     Raises
     ------
@@ -247,9 +297,10 @@ def write_mcap(
         the file cannot be written, or a stamp is none that ROS can hold.
     """
     with atomic_file(path) as file:
-        recorder = Recorder(path, scanners, truth=truth, reference_mount=reference_mount, chunk_s=_LONG_S, file=file)
-        for record in records:
-            recorder.append(record)
+        recorder = Recorder(
+            path, scanners, truth=truth, reference_mount=reference_mount, start=start, chunk_s=_LONG_S, file=file
+        )
+        recorder.append_all(records, beside)
         recorder.close()
 
 
@@ -260,6 +311,8 @@ def write_bag(
     *,
     scanners: tuple[str, ...] = (ONLY_NAME,),
     reference_mount: ReferenceMount = BASE,
+    start: RecordedStart | None = None,
+    beside: Iterable[Message] = (),
 ) -> None:
     """Write a whole recording as a bag of ROS 1 (.bag) or of ROS 2 in sqlite3 (.db3); see `write_mcap`.
 
@@ -270,6 +323,8 @@ def write_bag(
     truth : the constants of a virtual drive.
     scanners : names of the scanners that records have indices of.
     reference_mount : where the reference measures.
+    start : where the vehicle was said to be before the first record.
+    beside : what stands beside the records of another file, as it lies there.
 
     Raises
     ------
@@ -277,13 +332,18 @@ def write_bag(
         the file cannot be written, or a stamp is none that ROS can hold.
     """
     with atomic_bag(path) as writer:
-        recorder = Recorder(path, scanners, truth=truth, reference_mount=reference_mount, writer=writer)
-        for record in records:
-            if record.stamp_ns < 0 and writer.is_ros1:
-                found = f"cannot hold a record: its stamp is {record.stamp_ns} ns"
-                raise FileFormatError(path, "", found, "1970 or later, where the time of ROS 1 begins")
-            recorder.append(record)
+        recorder = Recorder(path, scanners, truth=truth, reference_mount=reference_mount, start=start, writer=writer)
+        recorder.append_all(_since_1970(path, records) if writer.is_ros1 else records, beside)
         recorder.close()
+
+
+def _since_1970(path: Path, records: Iterable[Record]) -> Iterator[Record]:
+    """Deliver records whose stamps ROS 1 can hold; raises FileFormatError at the first of another one."""
+    for record in records:
+        if record.stamp_ns < 0:
+            found = f"cannot hold a record: its stamp is {record.stamp_ns} ns"
+            raise FileFormatError(path, "", found, "1970 or later, where the time of ROS 1 begins")
+        yield record
 
 
 def scanner_topics(scanners: Sequence[str]) -> tuple[str, ...]:

@@ -8,7 +8,9 @@ from pathlib import Path
 from commission.errors import UsageError
 from commission.io.overwriting import refuse_files, refuse_recording
 from commission.io.recordings.csv_writer import write_recording
+from commission.io.recordings.mcap_reader import Message
 from commission.io.recordings.recorder import write_bag, write_mcap
+from commission.site.recorded_start import RecordedStart
 from commission.site.records import Record
 from commission.site.reference_mount import BASE, ReferenceMount
 from commission.site.scanner import ONLY_NAME
@@ -53,6 +55,8 @@ def write_records(
     *,
     scanners: tuple[str, ...] = (ONLY_NAME,),
     reference_mount: ReferenceMount = BASE,
+    start: RecordedStart | None = None,
+    beside: Iterable[Message] = (),
 ) -> None:
     """Write a recording: as MCAP or as a bag where the name ends so, else as a CSV folder.
 
@@ -63,14 +67,24 @@ def write_records(
     truth : the constants of a virtual drive.
     scanners : names of the scanners that records have indices of.
     reference_mount : where the reference measures.
+    start : where the vehicle was said to be before the first record; a CSV folder has no place for it.
+    beside : what stands beside the records of another file; a CSV folder has no place for it.
 
     Raises
     ------
     FileFormatError
         it cannot be written, or the format cannot hold a record.
     """
-    write = _writer_of(path) or write_recording
-    write(path, records, truth, scanners=scanners, reference_mount=reference_mount)
+    write = _writer_of(path)
+    if write is None:
+        write_recording(path, records, truth, scanners=scanners, reference_mount=reference_mount)
+        return
+    write(path, records, truth, scanners=scanners, reference_mount=reference_mount, start=start, beside=beside)
+
+
+def holds_all(path: Path) -> bool:
+    """Whether what is written there holds all of a recording, also where it began and what the localizer said."""
+    return _writer_of(path) is not None
 
 
 def _writer_of(path: Path) -> Callable[..., None] | None:

@@ -110,4 +110,11 @@ IO = (
             + "test_vehicle_whose_odometry_is_in_transforms_only_is_moved_by_them",
         ),
     ),
+    Mutant(
+        name="what stands behind the last record is not carried",
+        file=FOLDER + "recordings/recorder.py",
+        find="        while first is not None:\n            self.append_beside(first)",
+        replace="        while False and first is not None:\n            self.append_beside(first)",
+        tests=(TESTS + "recordings/test_carried.py::test_bytes_are_the_same_after_a_way_through_every_format",),
+    ),
 )
