@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 from scipy import sparse
-from scipy.linalg import cho_factor, cho_solve, cho_solve_banded, cholesky_banded
+from scipy.linalg import cho_factor, cho_solve, cholesky_banded
 from scipy.spatial import KDTree
 
 from commission.geometry import se2
 from commission.geometry.angles import wrap
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray
+from commission.geometry.banded import solved
 from commission.progress import Progress, silent
 from commission.studies.calibration_model import (
     MeasuredDrive,
@@ -174,6 +175,8 @@ class _System:
     """(R,) scan of each row."""
     banded: FloatArray
     """Cholesky factor of the poses' part."""
+    cross: SparseMatrix
+    """(3 K, p) information that poses and free constants share."""
     response: FloatArray
     """(3 K, p) how poses follow the constants."""
     schur: tuple[FloatArray, bool]
@@ -204,11 +207,11 @@ class _System:
         prior = np.where(free, problem.prior, 1.0)
         precision = np.where(free, 1.0 / (prior**2 * (1.0 + (point.constants / prior) ** 2 / TAIL)), 0.0)
         banded = _factor(by_poses)
-        cross = (by_poses.T @ by_constants).toarray()
-        cross[:, ~free] = 0.0
-        response = cho_solve_banded((banded, True), cross)
+        cross = (by_poses.T @ by_constants).tocsr()
+        cross.data *= free[cross.indices]
+        response = solved(banded, cross.toarray())
         # Sparse on purpose: the threads of a dense product wait for each other where the machine is busy.
-        information = (by_constants.T @ by_constants).toarray() - by_constants.T @ (by_poses @ response)
+        information = (by_constants.T @ by_constants).toarray() - cross.T @ response
         information[~free] = 0.0
         information[:, ~free] = 0.0
         schur = cho_factor(information + np.diag(np.where(free, precision, 1.0)))
@@ -225,6 +228,7 @@ class _System:
             whitened=whitened,
             row_cycle=row_cycle,
             banded=banded,
+            cross=cross,
             response=response,
             schur=schur,
             information=information,
@@ -249,11 +253,10 @@ class _System:
 
     def solve(self, right_poses: FloatArray, right_constants: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Steps of poses and constants for right-hand sides of any number of columns."""
-        followed = np.einsum("ip,iq->pq", self.response, right_poses)
+        followed = self.cross.T @ solved(self.banded, right_poses)
         right = np.where(self.free[:, np.newaxis], right_constants - followed, 0.0)
         constants = cho_solve(self.schur, right)
-        poses = cho_solve_banded((self.banded, True), right_poses) - np.einsum("ip,pq->iq", self.response, constants)
-        return poses, constants
+        return solved(self.banded, right_poses - self.cross @ constants), constants
 
     def improved(self) -> Point:
         """One Gauss-Newton step; poses are carried to the moments that the new clocks say."""

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from commission.compiled import compiled, compiled_inline
 from commission.geometry.angles import wrap
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
 from commission.localization import whole_run
@@ -229,14 +230,11 @@ def _agreement(one: RunColumns, other: RunColumns, factor: float) -> Agreement:
     F[:, 0, 2], F[:, 1, 2] = before[:, 1] - priors[0].means[:, 1], priors[0].means[:, 0] - before[:, 0]
     Q = priors[0].covariances - F @ spread @ np.swapaxes(F, 1, 2)
     A, B = (
-        np.swapaxes(np.linalg.solve(prior.covariances, run.covariances), 1, 2)
+        np.swapaxes(np.asarray(np.linalg.solve(prior.covariances, run.covariances), dtype=np.float64), 1, 2)
         for prior, run in zip(priors, (one, other), strict=True)
     )
-    B_T, F_T = np.swapaxes(B, 1, 2), np.swapaxes(F, 1, 2)
-    common, shared = np.array(start.covariance), np.empty((len(one), 3, 3))
-    for k in range(len(one)):
-        common = A[k] @ (F[k] @ common @ F_T[k] + Q[k]) @ B_T[k]
-        shared[k] = common
+    shared = np.empty((len(one), 3, 3))
+    _share(A, B, F, Q, read_only(np.array(start.covariance)), shared)
     # Where neither has seen anything yet the two are one: a floor of 0.1 mm.
     V = one.covariances + other.covariances - shared - np.swapaxes(shared, 1, 2) + 1e-8 * np.eye(3)
     difference = one.means - other.means
@@ -252,6 +250,39 @@ def _agreement(one: RunColumns, other: RunColumns, factor: float) -> Agreement:
         score=Score(np.bincount(block, likelihood).astype(np.float64), np.bincount(block).astype(np.float64), math.nan),
         ratios=(float(d2[:middle].mean() / 3.0), float(d2[middle:].mean() / 3.0)),
     )
+
+
+@compiled
+def _share(A: FloatArray, B: FloatArray, F: FloatArray, Q: FloatArray, begin: FloatArray, shared: FloatArray) -> None:  # noqa: PLR0917
+    """Write the covariance of two runs with each other, cycle by cycle.
+
+    Notes
+    -----
+    C = A (F C F^T + Q) B^T, see `_agreement`; derived.
+    """
+    common, left, right = begin.copy(), np.empty((3, 3)), np.empty((3, 3))
+    for k in range(len(shared)):
+        _product(F[k], common, left)
+        _product(left, F[k].T, right)
+        for i in range(3):
+            for j in range(3):
+                right[i, j] += Q[k, i, j]
+        _product(A[k], right, left)
+        _product(left, B[k].T, common)
+        shared[k] = common
+
+
+@compiled_inline
+def _product(left: FloatArray, right: FloatArray, product: FloatArray) -> None:
+    """Write the product of two 3 x 3 matrices.
+
+    Notes
+    -----
+    P_ij = sum of L_ik R_kj, by definition.
+    """
+    for i in range(3):
+        for j in range(3):
+            product[i, j] = left[i, 0] * right[0, j] + left[i, 1] * right[1, j] + left[i, 2] * right[2, j]
 
 
 def _blocks(run: RunColumns) -> IntArray:

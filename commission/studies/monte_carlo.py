@@ -123,7 +123,7 @@ def _localized(given: _Prepared, route: str, log: RecordLog, progress: Progress)
     pose, sigmas = given.starts[route]
     start = Start(belief_at(log.first_ns, pose, tuple(sigmas.tolist())), StartOrigin.DRIVE)
     run = RunInput.of(given.inputs.project, log, start).with_setup(given.setup)
-    return judged_run(run, progress)
+    return judged_run(run, progress, of_scanners=False)
 
 
 def _figures(result: RunResult, which: tuple[int, int, str], faults: DrawnFaults, carried: int) -> DriveFigures:

@@ -174,7 +174,7 @@ class RunResult:
     episodes: tuple[FailEpisode, ...]
     """Stretches in fail mode."""
     scanners: tuple[ScannerFigures, ...]
-    """What each scanner contributed."""
+    """What each scanner contributed; empty where nobody asked."""
     microseconds_per_cycle: float
     """Time that the localizer took per cycle, detection in scans included where it was done [us]."""
 
@@ -227,6 +227,7 @@ def judged_run(
     progress: Progress = silent,
     *,
     earlier: RunResult | None = None,
+    of_scanners: bool = True,
     clock: Callable[[], float] = time.perf_counter,
 ) -> RunResult:
     """Localize a drive and judge the result.
@@ -237,6 +238,7 @@ def judged_run(
     progress : called every few thousand cycles.
     earlier : result of other inputs; what the two have in common is taken from it. All figures are the same to the last
         bit, but for the time per cycle, which is that of the cycles that were computed.
+    of_scanners : whether the figures of each scanner are wanted; they take almost as long as all others together.
     clock : returns seconds.
 
     Raises
@@ -257,10 +259,12 @@ def judged_run(
     )
     microseconds_per_cycle = (clock() - before) * 1e6 / len(columns)
     progress(1.0 - JUDGING_SHARE, "judging the run")
-    return judge(inputs, columns, microseconds_per_cycle)
+    return judge(inputs, columns, microseconds_per_cycle, of_scanners=of_scanners)
 
 
-def judge(inputs: RunInput, columns: RunColumns, microseconds_per_cycle: float) -> RunResult:
+def judge(
+    inputs: RunInput, columns: RunColumns, microseconds_per_cycle: float, *, of_scanners: bool = True
+) -> RunResult:
     """Compute every figure of a run that is there; a live one may go on.
 
     Parameters
@@ -268,18 +272,21 @@ def judge(inputs: RunInput, columns: RunColumns, microseconds_per_cycle: float) 
     inputs : what it was made of, and the reference poses of its drive.
     columns : the run.
     microseconds_per_cycle : time that the localizer took [us].
+    of_scanners : as in `judged_run`; without them, `scanners` is empty.
     """
     log = inputs.log
     references, tallies = references_of(log, columns), tallies_of(columns)
-    # Of hours, half of the figures take as long as the others: a core each.
-    with ThreadPoolExecutor(1) as beside:
-        pending = beside.submit(scanner_figures, columns, references, tallies)
-        errors = pose_errors(columns.means, references)
-        covariances = _of_places_known(columns, log, references)
-        statistics = error_statistics(errors, covariances, columns.modes == Mode.OPERATIONAL, _position_limits(columns))
-        scanners = pending.result()
+    scanners: tuple[ScannerFigures, ...] = ()
+    if of_scanners:
+        # Of hours, half of the figures take as long as the others: a core each.
+        with ThreadPoolExecutor(1) as beside:
+            pending = beside.submit(scanner_figures, columns, references, tallies)
+            errors, statistics = _errors_of(log, columns, references)
+            scanners = pending.result()
+    else:
+        errors, statistics = _errors_of(log, columns, references)
     # Each is a column of the whole run: it goes before the others come.
-    del references, covariances
+    del references
     whole, newest = consistency(columns, tallies=tallies), recent(columns, tallies=tallies)
     counts, largest_d2 = tallies.counts, tallies.largest_d2
     del tallies
@@ -303,6 +310,15 @@ def judge(inputs: RunInput, columns: RunColumns, microseconds_per_cycle: float) 
         scanners=scanners,
         microseconds_per_cycle=microseconds_per_cycle,
     )
+
+
+def _errors_of(
+    log: RecordLog, columns: RunColumns, references: FloatArray
+) -> tuple[FloatArray, ErrorStatistics | None]:
+    """(K, 3) errors against the reference, and what they come to."""
+    errors, operational = pose_errors(columns.means, references), columns.modes == Mode.OPERATIONAL
+    covariances = _of_places_known(columns, log, references)
+    return errors, error_statistics(errors, covariances, operational, _position_limits(columns))
 
 
 def _of_places_known(columns: RunColumns, log: RecordLog, references: FloatArray) -> FloatArray:

@@ -166,7 +166,7 @@ def _value_at(given: _Given, place: tuple[int, ...], progress: Progress) -> floa
     """The figure at one place."""
     inputs = given.inputs
     parameters = inputs.run.segments[0].setup.parameters
-    run = judged_run(_at(inputs, parameters, place), progress, earlier=given.first)
+    run = judged_run(_at(inputs, parameters, place), progress, earlier=given.first, of_scanners=False)
     return BY_KEY[inputs.figure].value(run)
 
 
