@@ -15,6 +15,7 @@ from commission.geometry.arrays import FloatArray, IntArray
 from commission.site.quantity import MILLIMETRES, PERCENT
 from commission.studies.events import EventsResult, told
 from commission.studies.integrity import Protection
+from commission.studies.plausibility import Finding
 from commission.studies.reflector_figures import ReflectorFigures
 
 CLASSES = 6
@@ -29,6 +30,8 @@ class Found:
     """What happened."""
     figures: ReflectorFigures
     """What each reflector contributed."""
+    misplaced: tuple[Finding, ...] = ()
+    """What single scans say of where reflectors stand to each other."""
     levels: Protection | None = None
     """Protection levels of its cycles."""
 

@@ -16,6 +16,7 @@ from commission.progress import Progress, part
 from commission.site.floor_map import FloorMap
 from commission.studies.events import EventsInput, events
 from commission.studies.integrity import protection
+from commission.studies.map_shape_findings import map_shape_findings
 from commission.studies.reflector_figures import ReflectorFiguresInput, reflector_figures
 from commission.studies.run import RunResult
 
@@ -45,7 +46,9 @@ class Instruments:
 
         def look(progress: Progress) -> Found:
             happened = events(EventsInput(result), part(progress, 0.0, 0.4))
-            return Found(happened, reflector_figures(figures, part(progress, 0.4, 1.0)))
+            contributed = reflector_figures(figures, part(progress, 0.4, 0.9))
+            progress(0.9, "where reflectors stand to each other")
+            return Found(happened, contributed, map_shape_findings(result))
 
         self._jobs.start("Events and reflectors", look, then=self._keep, is_shown=False)
 

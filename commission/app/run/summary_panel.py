@@ -10,12 +10,14 @@ from commission.app.base import theme
 from commission.app.base.inputs import Text
 from commission.app.base.panel import BasePanel, escaped, table
 from commission.app.base.view import PageView
+from commission.app.run.found_table import Found
 from commission.app.run.view import RunView
 from commission.site.quantity import PERCENT
 from commission.site.stations import Station
 from commission.studies.bearing_figures import bearing_figures, bearing_findings
 from commission.studies.consistency import Consistency
 from commission.studies.consistency_findings import consistency_findings
+from commission.studies.plausibility import Finding
 from commission.studies.run import RunResult
 from commission.studies.sections import Section, sections
 
@@ -34,13 +36,25 @@ class SummaryPanel(BasePanel):
         if run is None:
             self._html.write((None,), str)
             return
-        stations = view.state.project.stations
-        self._html.write((id(run.result), stations), lambda: summary(run.result, stations))
+        stations, misplaced = view.state.project.stations, misplaced_of(view.part(Found), run.result)
+        self._html.write((id(run.result), stations, misplaced), lambda: summary(run.result, stations, misplaced))
 
 
-def summary(result: RunResult, stations: tuple[Station, ...]) -> str:
-    """Return what looks wrong, and the figures of the drive and of its sections."""
-    findings = (*consistency_findings(result.columns), *bearing_findings(result.columns))
+def misplaced_of(found: Found | None, result: RunResult) -> tuple[Finding, ...]:
+    """Return what is known of where reflectors stand to each other, once it is found on this run and no earlier one."""
+    return found.misplaced if found is not None and found.events.inputs.run is result else ()
+
+
+def summary(result: RunResult, stations: tuple[Station, ...], misplaced: tuple[Finding, ...] = ()) -> str:
+    """Return what looks wrong, and the figures of the drive and of its sections.
+
+    Parameters
+    ----------
+    result : the whole drive.
+    stations : between which sections lie.
+    misplaced : what was found in the background of where reflectors stand to each other.
+    """
+    findings = (*consistency_findings(result.columns), *misplaced, *bearing_findings(result.columns))
     background = theme.css(theme.WARNING_LINE)
     lines = "".join(
         f"<div class='c-finding' style='background:{background};{FINDING_STYLE}'>"

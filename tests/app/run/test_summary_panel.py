@@ -9,8 +9,9 @@ import numpy as np
 
 from commission.app.base.state import AppState
 from commission.app.run.actions import ColorTrail
+from commission.app.run.found_table import Found
 from commission.app.run.state import RunState
-from commission.app.run.summary_panel import rows, summary
+from commission.app.run.summary_panel import misplaced_of, rows, summary
 from commission.app.run.trail_colors import COLORINGS, TrailBy, palette, pieces, values_of
 from commission.app.run.trail_legend import trail_scale
 from commission.geometry.arrays import read_only
@@ -18,6 +19,9 @@ from commission.localization.estimate import Status
 from commission.site.project import Project
 from commission.site.stations import Station
 from commission.studies.consistency import Recent, consistency
+from commission.studies.events import EventsInput, events
+from commission.studies.plausibility import Finding
+from commission.studies.reflector_figures import ReflectorFiguresInput, reflector_figures
 from commission.studies.run import RunResult
 from commission.studies.sections import sections
 from tests.app.asking import after
@@ -44,6 +48,19 @@ def test_what_looks_wrong_is_said_and_otherwise_that_nothing_does(result: RunRes
     told = summary(lost, ())
     assert "100 % of the detections are rejected from 0.0 s on" in told
     assert "Nothing looks wrong" not in told
+
+
+def test_reflectors_that_do_not_stand_as_the_map_says_are_told_once_they_are_found(result: RunResult) -> None:
+    misplaced = Finding(found="<R1> by 80 mm", probably="the map is wrong", remedy="survey again")
+    told = summary(result, (), (misplaced,))
+    assert "&lt;R1&gt; by 80 mm" in told
+    assert "the map is wrong" in told
+    assert "Nothing looks wrong" not in told
+    figures = ReflectorFiguresInput.of(result, None)
+    found = Found(events(EventsInput(result)), reflector_figures(figures), (misplaced,))
+    assert misplaced_of(found, result) == (misplaced,)
+    assert misplaced_of(found, replace(result)) == ()
+    assert misplaced_of(None, result) == ()
 
 
 def test_each_section_between_stations_has_a_row_with_its_figures(result: RunResult) -> None:

@@ -6,6 +6,27 @@ FOLDER, TESTS = "commission/studies/", "tests/studies/"
 
 STUDIES = (
     Mutant(
+        name="ranges that grow too fast laid on the map",
+        file=FOLDER + "map_shape.py",
+        find="by_rest[:, 0, -3], by_rest[:, 0, -2] = 1.0, distances",
+        replace="by_rest[:, 0, -3], by_rest[:, 0, -2] = 1.0, 0.0",
+        tests=(TESTS + "test_map_shape.py::test_ranges_that_grow_too_fast_are_not_laid_on_the_map",),
+    ),
+    Mutant(
+        name="scans that are alike taken for independent",
+        file=FOLDER + "map_shape.py",
+        find="factor = (squares + STATED_VIEWS * worst) / (max(freedom, 0) + STATED_VIEWS)",
+        replace="factor = 1.0",
+        tests=(TESTS + "test_map_shape.py::test_errors_that_last_for_a_while_are_not_laid_on_the_map",),
+    ),
+    Mutant(
+        name="a map that makes the vehicle lost is not looked at",
+        file=FOLDER + "map_shape_findings.py",
+        find="LOST_SHARE = 0.2",
+        replace="LOST_SHARE = 1.0",
+        tests=(TESTS + "test_map_shape.py::test_a_map_that_makes_the_vehicle_lost_is_named_all_the_same",),
+    ),
+    Mutant(
         name="wrong while operational only beyond twice the limit",
         file=FOLDER + "metrics.py",
         find="operational & (distance > position_limit)",
