@@ -17,7 +17,7 @@ from commission.io.live.clocks import DevicePlaces, HostClock
 from commission.io.live.driver import Driver
 from commission.io.live.links import Link, Opened
 from commission.io.live.registry import SourceAddress
-from commission.io.live.senders import Sender, Senders
+from commission.io.live.senders import NEW_PORTS, Ports, Sender, Senders
 from commission.io.live.sorter import stamped
 from commission.io.live.status import ODOMETRY, Arrivals, Numbers, SourceState, SourceStatus, Tally
 from commission.io.protocols.message import LiveMessage, Sent
@@ -27,6 +27,8 @@ RETRY_S = (0.1, 0.2, 0.5, 1.0, 2.0)
 """Times before connecting again, the last one for ever [s]."""
 SENDER_LIMIT = 8
 """Senders to one address that are remembered at once."""
+AGAIN = 3
+"""Numbers in a row that ascend, and are less than one that came: the sender counts from the begin again."""
 REST_NS = 1_000_000_000
 """Time after the end in which what had arrived is still received [ns]."""
 
@@ -99,6 +101,7 @@ class Connection:
         self._conversations = 0
         self._is_one_scanner = False
         self._senders = Senders(self._told)
+        self._ports = Ports()
         self._opened: Opened | None = None
         self._is_busy = False
         self._end_ns = 0
@@ -187,15 +190,16 @@ class Connection:
                     opened.send(talk.driver.reply(arrived_ns))
                 continue
             self._tally.bytes_received += len(piece.data)
+            sender = piece.sender if self._is_one_scanner else self._ports.program(piece.sender)
             # Fragments of two scanners would be taken for those of one.
-            if self._is_one_scanner and not self._senders.takes(0, piece.sender, arrived_ns):
+            if self._is_one_scanner and not self._senders.takes(0, sender, arrived_ns):
                 continue
-            if piece.sender not in conversations:
-                conversations[piece.sender] = self._begun(piece.sender)
-            conversations.move_to_end(piece.sender)
+            if sender not in conversations:
+                conversations[sender] = self._begun(sender)
+            conversations.move_to_end(sender)
             if len(conversations) > SENDER_LIMIT:
                 conversations.popitem(last=False)
-            talk = conversations[piece.sender]
+            talk = conversations[sender]
             try:
                 for message in talk.driver.take(piece.data, arrived_ns):
                     self._deliver(message, arrived_ns, talk, deliver)
@@ -226,16 +230,18 @@ class Connection:
         self, message: LiveMessage, arrived_ns: int, talk: _Conversation, deliver: Callable[[Arrival], bool]
     ) -> None:
         """Stamp a record and hand it on, unless it came before."""
-        before, channel = talk.places.begun_again, _channel(message.record)
+        channel = _channel(message.record)
         if not self._is_one_scanner and not self._senders.takes(channel, talk.sender, arrived_ns):
             return
+        if talk.counts_again(message.sequence, channel):
+            talk.places = DevicePlaces()
+            self._anew(talk)
+        before = talk.places.begun_again
         stamp_ns = talk.places.stamp(message.device_ns, arrived_ns, channel)
         device_ns = self._device_ns(message.device_ns, talk, channel)
         if talk.places.begun_again != before:
-            self._conversations += 1
-            talk.number, talk.numbers = self._conversations, Numbers()
-            self._tally.forget_times()
-        lost = talk.numbers.taken(message.sequence)
+            self._anew(talk)
+        lost = talk.taken(message.sequence, channel)
         if lost is None:
             self._tally.duplicates += 1
             return
@@ -245,6 +251,13 @@ class Connection:
             self._tally.timed(channel, device_ns, arrived_ns)
         if not deliver(Arrival(stamped(message.record, stamp_ns), arrived_ns, talk.number)):
             self._tally.overrun += 1
+
+    def _anew(self, talk: _Conversation) -> None:
+        """Take a sender for another one from here on: it began again."""
+        self._conversations += 1
+        talk.number = self._conversations
+        talk.numbers.clear()
+        self._tally.forget_times()
 
     def _device_ns(self, device_ns: int | None, talk: _Conversation, channel: int) -> int | None:
         """Time by the sender's clock [ns]; None where it has none, and told where it says that it has."""
@@ -270,5 +283,38 @@ class _Conversation:
 
     def __init__(self, driver: Driver, number: int, sender: Sender | None) -> None:
         self.driver, self.number, self.sender = driver, number, sender
-        self.numbers, self.places = Numbers(), DevicePlaces()
+        self.numbers: dict[int, Numbers] = {}
+        self.places = DevicePlaces()
         self.is_told = False
+        self._has_several = sender is not None and sender[1] == NEW_PORTS
+        self._behind: dict[int, tuple[int, int]] = {}
+        """Of each kind the number of the last message, and how many in a row were less than one that came."""
+
+    def counts_again(self, sequence: int | None, channel: int) -> bool:
+        """Whether a program whose ports tell nothing counts from the begin again: some numbers that came go on.
+
+        Parameters
+        ----------
+        sequence : number of a message; None where it has none.
+        channel : what kind of record it is of.
+        """
+        if not self._has_several or sequence is None:
+            return False
+        before, row = self._behind.get(channel, (sequence, 0))
+        is_behind = channel in self.numbers and self.numbers[channel].is_behind(sequence)
+        row = (row + 1 if row and sequence > before else 1) if is_behind else 0
+        self._behind[channel] = sequence, row
+        return row >= AGAIN
+
+    def taken(self, sequence: int | None, channel: int) -> int | None:
+        """Take the number of a message; see `Numbers.taken`.
+
+        Parameters
+        ----------
+        sequence : the number; None where it has none.
+        channel : what kind of record it is of.
+        """
+        # Several programs whose ports tell nothing count each for itself, or one counts all: both are not told apart.
+        numbers = self.numbers.setdefault(channel if self._has_several else 0, Numbers())
+        lost = numbers.taken(sequence)
+        return 0 if lost is not None and len(self.numbers) > 1 else lost

@@ -87,6 +87,10 @@ class Numbers:
         self._newest: int | None = None
         self._seen: deque[int] = deque(maxlen=SEEN)
 
+    def is_behind(self, sequence: int) -> bool:
+        """Whether a number is less than one that came."""
+        return self._newest is not None and sequence < self._newest
+
     def taken(self, sequence: int | None) -> int | None:
         """Take a number.
 
