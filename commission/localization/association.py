@@ -9,11 +9,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from commission.compiled import compiled_inline
-from commission.geometry.arrays import FloatArray, IntArray
 from commission.geometry.directions import UnitVector, composed
 from commission.geometry.gaussian import chi_square_gate
 from commission.localization.consider import BLOCKS, Considering
@@ -24,7 +20,8 @@ from commission.localization.joint import CAREFUL, EXCLUSIVE, JOINT, MOST_JOINTL
 from commission.localization.kalman import squared_distance
 from commission.localization.observation import ObservationModel, expect_at
 from commission.localization.pose_gaussian import PoseGaussian
-from commission.localization.reflector_index import Cells, cell_range
+from commission.localization.reflector_index import ReflectorIndex, cell_range
+from commission.localization.scan_rows import ScanRows
 from commission.localization.search import Viewpoint, radius2_by, reach_of, viewpoint
 from commission.site.parameters import ASSOCIATION_METHODS, AssociationParameters
 
@@ -74,7 +71,6 @@ def score(  # noqa: PLR0917 - a measurement and a reflector, number by number
     view: Viewpoint,
     model: ObservationModel,
     given: Considering | None,
-    work: FloatArray | None,
 ) -> tuple[float, float]:
     """Squared Mahalanobis distance to one reflector, and how much wider than the noise the innovation spreads.
 
@@ -87,7 +83,7 @@ def score(  # noqa: PLR0917 - a measurement and a reflector, number by number
     x, y : the reflector's center [m], map frame.
     surveyed_variance : of the reflector's place, each axis [m^2].
     view, model : scanner's place, and model of the observation.
-    given, work : of the scan, where constants are considered, else None; the reflector's columns are the first free.
+    given : of the scan, where constants are considered, else None; the reflector's columns are the first free.
 
     Notes
     -----
@@ -110,7 +106,6 @@ def score(  # noqa: PLR0917 - a measurement and a reflector, number by number
         view.offset_y,
         model,
         given,
-        work,
         BLOCKS,
     )
     return squared_distance(v), v.s_rr * v.schur * (1.0 / (model.range_variance * model.bearing_variance))
@@ -159,12 +154,8 @@ def likeliest(  # noqa: PLR0917 - a measurement, number by number, and the map
     reach: Viewpoint,
     model: ObservationModel,
     gate: Gate,
-    cells: Cells,
-    places: FloatArray,
-    cell_offsets: IntArray,
-    cross: FloatArray | None,
+    index: ReflectorIndex,
     given: Considering | None,
-    work: FloatArray | None,
 ) -> tuple[int, float]:
     """Most likely reflector of the whole map, found near the detection: its row in `places`, and d2.
 
@@ -181,13 +172,14 @@ def likeliest(  # noqa: PLR0917 - a measurement, number by number, and the map
     ray, aim : the bearing as a direction, of the map and of base.
     view, reach, model : scanner's place, bounds of the search (`reach_of`), and model of the observation.
     gate : of the association filter.
-    cells, places, cell_offsets : the map, see `ReflectorIndex`.
-    cross, given, work : of the scan, where constants are considered, else None.
+    index : the map.
+    given : of the scan, where constants are considered, else None.
 
     Notes
     -----
     argmin over reflectors of d2 + ln(det S), see `cost`: Sobreira et al. 2016, Algorithm 3, line 4.
     """
+    cells, places, cell_offsets = index
     px = belief.x + view.offset_x + measured_range * ray.cos - cells.origin_x
     py = belief.y + view.offset_y + measured_range * ray.sin - cells.origin_y
     best, best_d2, best_spread = NOBODY, math.nan, math.nan
@@ -210,11 +202,10 @@ def likeliest(  # noqa: PLR0917 - a measurement, number by number, and the map
                 dx, dy = x - cells.origin_x - px, y - cells.origin_y - py
                 if dx * dx + dy * dy > radius2:
                     continue
-                if cross is not None and given is not None and work is not None:
-                    take_out(work, BLOCKS, cross, entry, given)
+                take_out(given, BLOCKS, entry)
                 variance = places[entry, 2]
                 d2, spread = score(
-                    gate.kind, belief, facing, measured_range, ray, aim, x, y, variance, view, model, given, work
+                    gate.kind, belief, facing, measured_range, ray, aim, x, y, variance, view, model, given
                 )
                 # Mostly there is no other one to compare with, and no logarithm to take.
                 if d2 + spread < math.inf and (
@@ -238,40 +229,25 @@ def likeliest(  # noqa: PLR0917 - a measurement, number by number, and the map
 
 
 @compiled_inline
-def associate(  # noqa: PLR0917 - outputs are written into the arrays of the whole run
+def associate(  # noqa: PLR0917 - a scan at a belief
     belief: PoseGaussian,
     facing: UnitVector,
-    first: int,
-    last: int,
-    detections: FloatArray,
-    aims: FloatArray,
+    rows: ScanRows,
     model: ObservationModel,
     gate: Gate,
-    cells: Cells,
-    places: FloatArray,
-    cell_offsets: IntArray,
-    cross: FloatArray | None,
+    index: ReflectorIndex,
     given: Considering | None,
-    work: FloatArray | None,
-    status: NDArray[np.int8],
-    entries: IntArray,
-    d2: FloatArray,
 ) -> None:
     """Associate the detections of one scan, all at the predicted belief.
 
     Parameters
     ----------
     belief, facing : after *predict*, and the direction of its heading.
-    first, last : rows of the scan's detections, the last one excluded.
-    detections : (n, 2) measured range and bearing.
-    aims : see `cycle.prepare`.
+    rows : the scan's detections, in and out; what the detector has rejected is left alone.
     model : of the observation.
     gate : of the association filter.
-    cells, places, cell_offsets : the map, see `ReflectorIndex`.
-    cross, given, work : of the scan, where constants are considered, else None.
-    status : (n,) in: INLIER or OUTLIER_DETECTOR, the latter is left alone; out: a `Status`.
-    entries : (n,) out: row of `places`, or NOBODY.
-    d2 : (n,) out: squared Mahalanobis distance, NaN for nobody.
+    index : the map.
+    given : of the scan, where constants are considered, else None.
 
     Notes
     -----
@@ -282,32 +258,17 @@ def associate(  # noqa: PLR0917 - outputs are written into the arrays of the who
     is a false reflector beside the true one. With the filter disabled both stay, as in the paper. Other methods:
     `decide_together`.
     """
+    first, last, measured, aims, status, entries, d2 = rows
     view = viewpoint(belief, facing, model)
-    reach = reach_of(view, cells.largest_variance, given)
+    reach = reach_of(view, index.cells.largest_variance, given)
     for i in range(first, last):
         entries[i] = NOBODY
         d2[i] = math.nan
         if status[i] != INLIER:
             continue
-        measured = detections[i, 0] - model.range_bias
-        aim = UnitVector(aims[i - first, 0], aims[i - first, 1])
-        best, best_d2 = likeliest(
-            belief,
-            facing,
-            measured,
-            composed(facing, aim),
-            aim,
-            view,
-            reach,
-            model,
-            gate,
-            cells,
-            places,
-            cell_offsets,
-            cross,
-            given,
-            work,
-        )
+        distance, aim = measured[i, 0] - model.range_bias, UnitVector(aims[i - first, 0], aims[i - first, 1])
+        ray = composed(facing, aim)
+        best, best_d2 = likeliest(belief, facing, distance, ray, aim, view, reach, model, gate, index, given)
         entries[i] = best
         d2[i] = best_d2
         if best == NOBODY or (gate.enabled and not best_d2 <= gate.d2):
@@ -317,77 +278,24 @@ def associate(  # noqa: PLR0917 - outputs are written into the arrays of the who
             for other in range(first, i):
                 if status[other] == INLIER and entries[other] == best:
                     status[i if d2[other] <= best_d2 else other] = OUTLIER_ASSOCIATION
-    _decide_together(
-        gate.joint,
-        gate,
-        belief,
-        facing,
-        view,
-        reach,
-        first,
-        last,
-        detections,
-        aims,
-        model,
-        cells,
-        places,
-        cell_offsets,
-        cross,
-        given,
-        work,
-        status,
-        entries,
-        d2,
-    )
+    _decide_together(gate.joint, gate, belief, facing, view, reach, rows, model, index, given)
 
 
 @compiled_inline
-def _decide_together(  # noqa: PLR0917 - the scan's detections and the map, array by array
+def _decide_together(  # noqa: PLR0917 - a scan at a belief
     joint: tuple[float, ...] | None,
     gate: Gate,
     belief: PoseGaussian,
     facing: UnitVector,
     view: Viewpoint,
     reach: Viewpoint,
-    first: int,
-    last: int,
-    detections: FloatArray,
-    aims: FloatArray,
+    rows: ScanRows,
     model: ObservationModel,
-    cells: Cells,
-    places: FloatArray,
-    cell_offsets: IntArray,
-    cross: FloatArray | None,
+    index: ReflectorIndex,
     given: Considering | None,
-    work: FloatArray | None,
-    status: NDArray[np.int8],
-    entries: IntArray,
-    d2: FloatArray,
 ) -> None:
     """`decide_together`, where the gate has distances for several at once."""
     if joint is None:
         return
     if gate.enabled and CAREFUL <= gate.method <= JOINT:
-        decide_together(
-            gate.method,
-            gate.kind,
-            joint,
-            belief,
-            facing,
-            view,
-            reach,
-            first,
-            last,
-            detections,
-            aims,
-            model,
-            cells,
-            places,
-            cell_offsets,
-            cross,
-            given,
-            work,
-            status,
-            entries,
-            d2,
-        )
+        decide_together(gate.method, gate.kind, joint, belief, facing, view, reach, rows, model, index, given)

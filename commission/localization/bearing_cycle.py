@@ -27,10 +27,9 @@ from commission.localization.bearings import (
     lasting_part,
     stands_apart,
 )
-from commission.localization.consider import ConsiderModel
-from commission.localization.consider_columns import carry_over
-from commission.localization.contour import ContourScan
-from commission.localization.cycle import Cycle, held_back, supervised, with_temporary
+from commission.localization.consider import ConsiderModel, ConstantsRoom, busy_of, cross_of
+from commission.localization.consider_columns import carry_to
+from commission.localization.cycle import Cycle, TemporaryLook, held_back, supervised, with_temporary
 from commission.localization.filter_kinds import is_invariant
 from commission.localization.lasting import MET, lasts, remember, with_lasting
 from commission.localization.observation import scanner_offset
@@ -47,8 +46,6 @@ from commission.localization.rejection import (
 from commission.localization.rival_poses import RivalPoses
 from commission.localization.setup import FilterModel
 from commission.localization.state import FilterState
-from commission.localization.temporary_memory import TemporaryMemory
-from commission.localization.temporary_model import TemporaryModel
 from commission.localization.zones import ZoneRows, kinds_at
 
 
@@ -69,22 +66,18 @@ class Reflexes(NamedTuple):
 
 
 @compiled
-def process_reflex(  # noqa: PLR0917 - outputs are written into the arrays of the whole run
+def process_reflex(  # noqa: PLR0917 - a reflex and all that it is looked at with
     state: FilterState,
     stamp_ns: int,
+    following: NextOdometry,
     row: int,
     reflexes: Reflexes,
+    figures: FloatArray,
     model: FilterModel,
     places: FloatArray,
-    cross: FloatArray | None,
-    busy: IntArray | None,
-    following: NextOdometry,
-    figures: FloatArray,
     zones: ZoneRows,
-    temporary: TemporaryModel | None,
-    memory: TemporaryMemory | None,
-    scan: ContourScan | None,
-    goods: FloatArray | None,
+    room: ConstantsRoom | None,
+    temporary: TemporaryLook | None,
     rivals: RivalPoses | None,
 ) -> Cycle:
     """Process a reflex.
@@ -93,16 +86,15 @@ def process_reflex(  # noqa: PLR0917 - outputs are written into the arrays of th
     ----------
     state : after everything before this reflex.
     stamp_ns : of the reflex [ns].
+    following : the odometry record at or after the reflex, where it is known.
     row : of the reflex.
     reflexes : bearings, and the goniometer.
+    figures : (n, COLUMNS) out, see `bearings`.
     model : of the whole filter.
     places : the map, see `ReflectorIndex`.
-    cross : covariance of the pose with the constants, in and out, or None.
-    busy : see `busy_chunks`; None: as `cross`.
-    following : the odometry record at or after the reflex, where it is known.
-    figures : (n, COLUMNS) out, see `bearings`.
     zones : where which kinds correct the pose; bearings do where reflectors do.
-    temporary, memory, scan, goods : as in `process_scan`; the scan of a reflex has no beams.
+    room : covariance of the pose with the considered constants, in and out; None: none is considered.
+    temporary : as in `process_scan`; the scan of a reflex has no beams.
     rivals : where the vehicle may stand as well, or None; a bearing alone decides on none of them.
 
     Notes
@@ -110,10 +102,7 @@ def process_reflex(  # noqa: PLR0917 - outputs are written into the arrays of th
     No formula: `reach`, `correct_by_bearing_alone` and `supervised` in turn.
     """
     prior, motion = reach(state.belief, state.motion, stamp_ns, following, model.odometry)
-    if cross is not None and busy is not None:
-        moved = np.eye(3)
-        moved[0, 2], moved[1, 2] = -(prior.y - state.pivot[1]), prior.x - state.pivot[0]
-        carry_over(cross, moved, busy)
+    carry_to(room, prior, state.pivot)
     belief, twist = prior, velocity(state.motion, following)
     if kinds_at(zones, prior.x, prior.y).reflectors:
         belief = correct_by_bearing_alone(
@@ -124,14 +113,12 @@ def process_reflex(  # noqa: PLR0917 - outputs are written into the arrays of th
             reflexes.model,
             twist,
             model.consider,
-            cross,
-            busy,
+            cross_of(room),
+            busy_of(room),
             figures[row],
             is_invariant(model.gate.kind),
         )
-    belief = with_temporary(
-        prior, belief, temporary, memory, scan, state, motion, following, stamp_ns, model, cross, busy, goods
-    )
+    belief = with_temporary(prior, belief, temporary, state, motion, following, stamp_ns, model, room)
     use, named = figures[row, USE], reflexes.entries[row] >= 0
     near = 0.0
     if use == ACCEPTED:
@@ -143,7 +130,7 @@ def process_reflex(  # noqa: PLR0917 - outputs are written into the arrays of th
     evidence = weigh_bearing(state.evidence, stamp_ns, prior, use, near, model)
     evidence = weigh_lasting(evidence, stamp_ns, prior, figures[row], named, reflexes, places, twist, model.consider)
     figures[row, LASTING] = 1.0 if evidence.lasting else 0.0
-    pivot = state.pivot if cross is None else (belief.x, belief.y)
+    pivot = state.pivot if room is None else (belief.x, belief.y)
     after = supervised(state, stamp_ns, belief, motion, evidence, pivot, state.walls, model)
     return Cycle(prior, held_back(rivals, state, after, model))
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from commission.compiled import compiled_inline
 from commission.geometry.angles import wrap_scalar
-from commission.geometry.arrays import FloatArray
+from commission.geometry.arrays import FloatArray, IntArray
 from commission.geometry.directions import UnitVector, direction_of
 from commission.localization.kalman import (
     Innovation,
@@ -41,8 +41,19 @@ class ConsiderModel(NamedTuple):
     clock: float
 
 
+class ConstantsRoom(NamedTuple):
+    """Where a run keeps its covariance with the constants, and works a scan out."""
+
+    cross: FloatArray
+    """(3, 2 N + 5 S) covariance of the pose with the constants; further kinds of observation have columns behind."""
+    work: FloatArray
+    """(3, `BLOCKS` + 2 n) room for the largest scan: `consider_columns`."""
+    busy: IntArray | None
+    """See `busy_chunks`; None: all are."""
+
+
 class Considering(NamedTuple):
-    """What is common to all detections of a scan."""
+    """What is common to all detections of a scan, and the arrays in which it is worked out."""
 
     variances: ConsiderModel
     moved_x: float
@@ -52,6 +63,33 @@ class Considering(NamedTuple):
     """Velocity of base at the scan [m/s], in base."""
     speed_y: float
     turn_rate: float
+    room: ConstantsRoom
+
+
+@compiled_inline
+def cross_of(room: ConstantsRoom | None) -> FloatArray | None:
+    """Covariance of the pose with the constants, or None where none is considered.
+
+    Notes
+    -----
+    No formula: a part of `room`.
+    """
+    if room is None:
+        return None
+    return room.cross
+
+
+@compiled_inline
+def busy_of(room: ConstantsRoom | None) -> IntArray | None:
+    """Which chunks of its columns may not be zero, see `busy_chunks`, or None where none is considered.
+
+    Notes
+    -----
+    No formula: a part of `room`.
+    """
+    if room is None:
+        return None
+    return room.busy
 
 
 class Seen(NamedTuple):
@@ -79,7 +117,7 @@ class Seen(NamedTuple):
 
 @compiled_inline
 def considering(  # noqa: PLR0917 - what the filter knows of its motion
-    cross: FloatArray | None,
+    room: ConstantsRoom | None,
     belief: PoseGaussian,
     pivot: tuple[float, float],
     motion: Motion,
@@ -90,21 +128,21 @@ def considering(  # noqa: PLR0917 - what the filter knows of its motion
 
     Parameters
     ----------
-    cross, belief, pivot, variances : as in `considering_at`.
+    room, belief, pivot, variances : as in `considering_at`.
     motion, following : odometry before the scan and after it.
 
     Notes
     -----
     No formula: `considering_at` the `velocity`.
     """
-    if cross is None:
+    if room is None:
         return None
-    return considering_at(cross, belief, pivot, velocity(motion, following), variances)
+    return considering_at(room, belief, pivot, velocity(motion, following), variances)
 
 
 @compiled_inline
 def considering_at(
-    cross: FloatArray | None,
+    room: ConstantsRoom | None,
     belief: PoseGaussian,
     pivot: tuple[float, float],
     twist: tuple[float, float, float],
@@ -114,7 +152,7 @@ def considering_at(
 
     Parameters
     ----------
-    cross : (3, 2 N + 5 S) covariance of the pose with the constants, or None.
+    room : covariance of the pose with the constants, and where the scan is worked out; or None.
     belief : after *predict*.
     pivot : place of the belief [m] when `cross` was written.
     twist : velocity of base at the scan [m/s, m/s, rad/s], in base.
@@ -124,9 +162,9 @@ def considering_at(
     -----
     moved = belief - pivot: what F of all motion since then is made of, by definition.
     """
-    if cross is None:
+    if room is None:
         return None
-    return Considering(variances, belief.x - pivot[0], belief.y - pivot[1], twist[0], twist[1], twist[2])
+    return Considering(variances, belief.x - pivot[0], belief.y - pivot[1], twist[0], twist[1], twist[2], room)
 
 
 class ScannerJacobian(NamedTuple):
@@ -172,9 +210,7 @@ def scanner_jacobian(
 
 
 @compiled_inline
-def seen_with(  # noqa: PLR0917 - a detection and the constants, number by number
-    facing: UnitVector, e: Expected, surveyed_variance: float, given: Considering, work: FloatArray, at: int
-) -> Seen:
+def seen_with(facing: UnitVector, e: Expected, surveyed_variance: float, given: Considering, at: int) -> Seen:
     """What the constants have to do with a detection.
 
     Parameters
@@ -183,8 +219,7 @@ def seen_with(  # noqa: PLR0917 - a detection and the constants, number by numbe
     e : what is expected of the reflector.
     surveyed_variance : of its place, each axis [m^2].
     given : of the scan.
-    work : working array of the scan.
-    at : first of the two columns of the reflector.
+    at : first of the two columns of the reflector in the working array.
 
     Notes
     -----
@@ -194,7 +229,7 @@ def seen_with(  # noqa: PLR0917 - a detection and the constants, number by numbe
     mount_xr, mount_xb, mount_yr, mount_yb, clock_r, clock_b = scanner_jacobian(
         facing, e, given.speed_x, given.speed_y, given.turn_rate
     )
-    p = given.variances
+    p, work = given.variances, given.room.work
     places = surveyed_variance
     rr = p.mount_position * (mount_xr * mount_xr + mount_yr * mount_yr)
     rr += places * (e.range_x * e.range_x + e.range_y * e.range_y) + p.range_bias + p.clock * clock_r * clock_r
@@ -299,7 +334,6 @@ def innovation_given(  # noqa: PLR0917 - a measurement, number by number
     surveyed_variance: float,
     model: ObservationModel,
     given: Considering | None,
-    work: FloatArray | None,
     at: int,
 ) -> Innovation:
     """Innovation of a detection, with constants where they are considered.
@@ -307,14 +341,14 @@ def innovation_given(  # noqa: PLR0917 - a measurement, number by number
     Parameters
     ----------
     belief, e, measured_range, measured_bearing, surveyed_variance, model : as in `kalman.innovation`.
-    given, work, at : as in `seen_with`, or None.
+    given, at : as in `seen_with`, or None.
 
     Notes
     -----
     No formula: `innovation` or `innovation_with`.
     """
     turn = wrap_scalar(measured_bearing - e.bearing)
-    if given is None or work is None:
+    if given is None:
         return innovation(belief, e, measured_range, turn, surveyed_variance, model)
-    seen = seen_with(direction_of(belief.theta), e, surveyed_variance, given, work, at)
+    seen = seen_with(direction_of(belief.theta), e, surveyed_variance, given, at)
     return innovation_with(belief, e, measured_range, turn, model, seen)

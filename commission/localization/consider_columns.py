@@ -10,7 +10,8 @@ import numpy as np
 
 from commission.compiled import compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray
-from commission.localization.consider import BLOCKS, PER_REFLECTOR, PER_SCANNER, Considering
+from commission.localization.consider import BLOCKS, PER_REFLECTOR, PER_SCANNER, Considering, ConstantsRoom
+from commission.localization.pose_gaussian import PoseGaussian
 
 NOTHING = 1e-20
 """What is smaller is 0 [m^2]: the square of a tenth of a nanometre moves no pose, and costs as much as what does."""
@@ -21,38 +22,30 @@ RECHECKED = 50
 
 
 @compiled_inline
-def working_array(
-    cross: FloatArray | None, given: Considering | None, reflectors: int, scanner: int, detections: int
-) -> FloatArray | None:
-    """Array in which a scan is worked out: (3, 8 + 2 detections), its first eight columns written.
+def room_for(cross: FloatArray | None, detections: int) -> ConstantsRoom | None:
+    """Room for one scan, or None where nothing is considered.
 
     Parameters
     ----------
-    cross, given, reflectors, scanner : as in `begin`; None gives None.
+    cross : covariance of the pose with the constants, or None.
     detections : of the scan.
 
     Notes
     -----
-    No formula: `begin`, in an array of its own.
+    No formula: it makes an array.
     """
-    if given is None:
-        return None
     if cross is None:
         return None
-    work = np.zeros((3, BLOCKS + PER_REFLECTOR * detections))
-    begin(work, cross, given, reflectors, scanner)
-    return work
+    return ConstantsRoom(cross, np.zeros((3, BLOCKS + PER_REFLECTOR * detections)), None)
 
 
 @compiled_inline
-def begin(work: FloatArray, cross: FloatArray, given: Considering, reflectors: int, scanner: int) -> None:
+def begin(given: Considering | None, reflectors: int, scanner: int) -> None:
     """Write the first eight columns of a working array.
 
     Parameters
     ----------
-    work : (3, 8 + 2 detections) or wider.
-    cross : covariance of the pose with the constants.
-    given : of the scan.
+    given : of the scan; nothing is written where nothing is considered.
     reflectors : N of the map.
     scanner : index of the scanner.
 
@@ -62,30 +55,33 @@ def begin(work: FloatArray, cross: FloatArray, given: Considering, reflectors: i
     et al. 2016, Algorithm 1, line 3. Every correction multiplies all columns alike, so the first three become the
     transition of those constants that the scan says nothing of.
     """
+    if given is None:
+        return
+    work = given.room.work
     for row in range(3):
         for column in range(3):
             work[row, column] = 1.0 if row == column else 0.0
     work[0, 2], work[1, 2] = -given.moved_y, given.moved_x
     start = PER_REFLECTOR * reflectors + PER_SCANNER * scanner
     for i in range(PER_SCANNER):
-        _move(work, 3 + i, cross, start + i, given)
+        _move(given, 3 + i, start + i)
 
 
 @compiled_inline
-def take_along(work: FloatArray, at: int, cross: FloatArray, entry: int) -> None:
+def take_along(given: Considering, at: int, entry: int) -> None:
     """Write the columns of a reflector, carried over all corrections of the scan so far.
 
     Parameters
     ----------
-    work : working array of the scan.
-    at : first of the two columns to write.
-    cross : covariance of the pose with the constants.
+    given : of the scan.
+    at : first of the two columns of the working array to write.
     entry : row of the reflector in `places`.
 
     Notes
     -----
-    C = A_i ... A_1 F C, with the transition in the first three columns of `work`: Schmidt 1966.
+    C = A_i ... A_1 F C, with the transition in the first three columns of the working array: Schmidt 1966.
     """
+    cross, work, _ = given.room
     for i in range(PER_REFLECTOR):
         column = PER_REFLECTOR * entry + i
         x, y, theta = cross[0, column], cross[1, column], cross[2, column]
@@ -94,28 +90,29 @@ def take_along(work: FloatArray, at: int, cross: FloatArray, entry: int) -> None
 
 
 @compiled_inline
-def take_out(work: FloatArray, at: int, cross: FloatArray, entry: int, given: Considering) -> None:
+def take_out(given: Considering | None, at: int, entry: int) -> None:
     """Write the columns of a reflector, carried to the scan.
 
     Parameters
     ----------
-    work : working array of the scan.
-    at : first of the two columns to write.
-    cross : covariance of the pose with the constants.
+    given : of the scan; nothing is written where nothing is considered.
+    at : first of the two columns of the working array to write.
     entry : row of the reflector in `places`.
-    given : of the scan.
 
     Notes
     -----
     C = F C: Sobreira et al. 2016, Algorithm 1, line 3, of a state augmented by a constant.
     """
-    _move(work, at, cross, PER_REFLECTOR * entry, given)
-    _move(work, at + 1, cross, PER_REFLECTOR * entry + 1, given)
+    if given is None:
+        return
+    _move(given, at, PER_REFLECTOR * entry)
+    _move(given, at + 1, PER_REFLECTOR * entry + 1)
 
 
 @compiled_inline
-def _move(work: FloatArray, at: int, cross: FloatArray, column: int, given: Considering) -> None:
+def _move(given: Considering, at: int, column: int) -> None:
     """Carry one column to the scan."""
+    cross, work, _ = given.room
     heading = cross[2, column]
     work[0, at] = cross[0, column] - given.moved_y * heading
     work[1, at] = cross[1, column] + given.moved_x * heading
@@ -123,21 +120,31 @@ def _move(work: FloatArray, at: int, cross: FloatArray, column: int, given: Cons
 
 
 @compiled_inline
-def put_back(cross: FloatArray, work: FloatArray, reflectors: int, scanner: int, busy: IntArray | None) -> None:
+def put_back(given: Considering, reflectors: int, scanner: int) -> None:
     """Carry the covariance with all constants over a scan, those of the scanner from the working array.
 
     Parameters
     ----------
-    cross : covariance of the pose with the constants, written in place; reflectors of the scan follow by `put_block`.
-    work : working array of the scan.
+    given : of the scan; reflectors of the scan follow by `put_block`.
     reflectors : N of the map.
     scanner : index of the scanner.
-    busy : (M,) see `busy_chunks`, written; None: all are.
 
     Notes
     -----
     C = A_n ... A_1 F C of what no detection has to do with: Schmidt 1966. 0 stays 0.
     """
+    cross, work, busy = given.room
+    _carry_busy(cross, work, busy)
+    start = PER_REFLECTOR * reflectors + PER_SCANNER * scanner
+    for row in range(3):
+        for i in range(PER_SCANNER):
+            cross[row, start + i] = work[row, 3 + i]
+    mark_busy(busy, start, start + PER_SCANNER)
+
+
+@compiled_inline
+def _carry_busy(cross: FloatArray, work: FloatArray, busy: IntArray | None) -> None:
+    """Multiply the columns that may not be zero by the transition of a scan."""
     columns = cross.shape[1]
     if busy is None:
         _carry(cross, work, 0, columns)
@@ -149,12 +156,6 @@ def put_back(cross: FloatArray, work: FloatArray, reflectors: int, scanner: int,
                 busy[chunk] -= 1
                 if busy[chunk] == 0 and not _all_zero(cross, first, last):
                     busy[chunk] = RECHECKED
-    start = PER_REFLECTOR * reflectors + PER_SCANNER * scanner
-    for row in range(3):
-        for i in range(PER_SCANNER):
-            cross[row, start + i] = work[row, 3 + i]
-    if busy is not None:
-        busy[start // CHUNK] = busy[(start + PER_SCANNER - 1) // CHUNK] = RECHECKED
 
 
 @compiled_inline
@@ -196,60 +197,83 @@ def _or_nothing(value: float) -> float:
 
 
 @compiled_inline
-def put_block(cross: FloatArray, work: FloatArray, at: int, entry: int, busy: IntArray | None) -> None:
+def put_block(given: Considering, at: int, entry: int) -> None:
     """Write the columns of a reflector of the scan back.
 
     Parameters
     ----------
-    cross : covariance of the pose with the constants, after `put_back`.
-    work : working array of the scan.
-    at : first of the two columns of the reflector.
+    given : of the scan, after `put_back`.
+    at : first of the two columns of the reflector in the working array.
     entry : row of the reflector in `places`.
-    busy : as in `put_back`.
 
     Notes
     -----
     C[:, i] = its column of the working array, by definition.
     """
+    cross, work, busy = given.room
     column = PER_REFLECTOR * entry
     for row in range(3):
         cross[row, column] = work[row, at]
         cross[row, column + 1] = work[row, at + 1]
-    if busy is not None:
-        # Both: a chunk holds whole reflectors.
-        busy[column // CHUNK] = RECHECKED
+    # A chunk holds whole reflectors.
+    mark_busy(busy, column, column + 1)
 
 
 @compiled_inline
-def carry_over(cross: FloatArray, transition: FloatArray, busy: IntArray) -> None:
+def carry_over(cross: FloatArray, transition: FloatArray, busy: IntArray | None) -> None:
     """Multiply the covariance with all constants by the transition of a correction.
 
     Parameters
     ----------
     cross : covariance of the pose with the constants, written in place.
     transition : (3, 3) or wider, whose first three columns count.
-    busy : (M,) see `busy_chunks`.
+    busy : (M,) see `busy_chunks`; None: all are.
 
     Notes
     -----
     C = A C: Schmidt 1966. 0 stays 0.
     """
-    for chunk in range(len(busy)):
-        if busy[chunk] > 0:
-            _carry(cross, transition, CHUNK * chunk, min(CHUNK * (chunk + 1), cross.shape[1]))
+    if busy is None:
+        _carry(cross, transition, 0, cross.shape[1])
+    else:
+        for chunk in range(len(busy)):
+            if busy[chunk] > 0:
+                _carry(cross, transition, CHUNK * chunk, min(CHUNK * (chunk + 1), cross.shape[1]))
 
 
 @compiled_inline
-def mark_busy(busy: IntArray, first: int, last: int) -> None:
+def carry_to(room: ConstantsRoom | None, belief: PoseGaussian, pivot: tuple[float, float]) -> None:
+    """Carry the covariance with all constants over the motion since it was written.
+
+    Parameters
+    ----------
+    room : written in place, or None.
+    belief : after *predict*.
+    pivot : place of the belief [m] when the covariance was written.
+
+    Notes
+    -----
+    C = F C, F = [[1, 0, -(y - y0)], [0, 1, x - x0], [0, 0, 1]]: Sobreira et al. 2016, Algorithm 1, line 3.
+    """
+    if room is None:
+        return
+    moved = np.eye(3)
+    moved[0, 2], moved[1, 2] = -(belief.y - pivot[1]), belief.x - pivot[0]
+    carry_over(room.cross, moved, room.busy)
+
+
+@compiled_inline
+def mark_busy(busy: IntArray | None, first: int, last: int) -> None:
     """Remember that columns from `first` to before `last` were written.
 
     Parameters
     ----------
-    busy : (M,) see `busy_chunks`, written.
+    busy : (M,) see `busy_chunks`, written; None: all are busy anyway.
     first, last : columns, no more than a chunk of them.
 
     Notes
     -----
     No formula: both chunks that they may lie in.
     """
-    busy[first // CHUNK] = busy[(last - 1) // CHUNK] = RECHECKED
+    if busy is not None:
+        busy[first // CHUNK] = busy[(last - 1) // CHUNK] = RECHECKED

@@ -46,7 +46,6 @@ def correct_aimed_with(  # noqa: PLR0917 - a measurement and a reflector, number
     surveyed_variance: float,
     model: ObservationModel,
     given: Considering,
-    work: FloatArray,
     width: int,
     at: int,
 ) -> Corrected:
@@ -60,9 +59,8 @@ def correct_aimed_with(  # noqa: PLR0917 - a measurement and a reflector, number
     reflector_x, reflector_y : the reflector's center [m], map frame.
     surveyed_variance : of the reflector's place, each axis [m^2].
     model : of the observation.
-    given : of the scan.
-    work : working array of the scan, corrected in place.
-    width : columns of `work` that are in use.
+    given : of the scan; its working array is corrected in place.
+    width : columns of it that are in use.
     at : first of the two columns of the reflector.
 
     Notes
@@ -74,10 +72,10 @@ def correct_aimed_with(  # noqa: PLR0917 - a measurement and a reflector, number
     dx, dy = reflector_x - (belief.x + offset_x), reflector_y - (belief.y + offset_y)
     e = expect_at(dx, dy, math.nan, offset_x, offset_y)
     turn = turn_to(-e.range_x, -e.range_y, composed(facing, aim))
-    d = seen_with(facing, e, surveyed_variance, given, work, at)
+    d = seen_with(facing, e, surveyed_variance, given, at)
     v = innovation_with(belief, e, measured_range, turn, model, d)
     k = gain(v)
-    covariance = covariance_with(belief, e, k, v, d, 0.0, surveyed_variance, given, work, width, at)
+    covariance = covariance_with(belief, e, k, v, d, 0.0, surveyed_variance, given, width, at)
     return moved_by(belief, facing, k, v, covariance)
 
 
@@ -91,7 +89,6 @@ def covariance_with(  # noqa: PLR0917 - a detection and the constants, number by
     cross_noise: float,
     surveyed_variance: float,
     given: Considering,
-    work: FloatArray,
     width: int,
     at: int,
 ) -> tuple[float, float, float, float, float, float]:
@@ -104,7 +101,7 @@ def covariance_with(  # noqa: PLR0917 - a detection and the constants, number by
     d : what the constants have to do with it.
     cross_noise : covariance of the noise of range and bearing [m rad].
     surveyed_variance : of the reflector's place, each axis [m^2].
-    given, work, width, at : as in `correct_aimed_with`.
+    given, width, at : as in `correct_aimed_with`.
 
     Notes
     -----
@@ -118,8 +115,8 @@ def covariance_with(  # noqa: PLR0917 - a detection and the constants, number by
     xx, xy, xt, yy, yt, tt = corrected_covariance(
         belief, e, k, v.range_noise + d.rr + 2.0 * hd_rr, v.bearing_noise + d.bb + 2.0 * hd_bb
     )
-    _correct_cross(work, width, e, k)
-    _add_constants(work, at, e, k, d, surveyed_variance, given.variances)
+    _correct_cross(given.room.work, width, e, k)
+    _add_constants(given.room.work, at, e, k, d, surveyed_variance, given.variances)
     return (
         xx + 2.0 * (n_rb * k.xr * k.xb - d.xr * k.xr - d.xb * k.xb),
         xy + n_rb * (k.xr * k.yb + k.xb * k.yr) - d.xr * k.yr - d.xb * k.yb - k.xr * d.yr - k.xb * d.yb,
@@ -174,7 +171,6 @@ def correct_given(  # noqa: PLR0917 - a measurement and a reflector, number by n
     surveyed_variance: float,
     model: ObservationModel,
     given: Considering | None,
-    work: FloatArray | None,
     at: int,
 ) -> PoseGaussian:
     """Correct a belief by a detection, with constants where they are considered.
@@ -183,16 +179,20 @@ def correct_given(  # noqa: PLR0917 - a measurement and a reflector, number by n
     ----------
     belief, measured_range, measured_bearing : as in `kalman.correct`.
     reflector_x, reflector_y, surveyed_variance, model : as in `kalman.correct`.
-    given, work, at : as in `correct_aimed_with`, or None.
+    given, at : as in `correct_aimed_with`, or None.
 
     Notes
     -----
     No formula: `correct`, or `correct_aimed_with` of the directions.
     """
     x, y = reflector_x, reflector_y
-    if given is None or work is None:
+    if given is None:
         return correct(belief, measured_range, measured_bearing, x, y, surveyed_variance, model)
-    aim, facing, width = direction_of(model.mount_theta + measured_bearing), direction_of(belief.theta), work.shape[1]
+    aim, facing, width = (
+        direction_of(model.mount_theta + measured_bearing),
+        direction_of(belief.theta),
+        given.room.work.shape[1],
+    )
     return correct_aimed_with(
-        belief, facing, measured_range, aim, x, y, surveyed_variance, model, given, work, width, at
+        belief, facing, measured_range, aim, x, y, surveyed_variance, model, given, width, at
     ).belief

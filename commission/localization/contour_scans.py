@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from commission.compiled import compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray, read_only
-from commission.localization.contour import ContourModel, ContourScan
+from commission.localization.contour import ContourScan
 from commission.localization.observation import observation_at
 from commission.localization.setup import LocalizerSetup
 from commission.localization.sweep import AT_ONCE, Sweep, sweep_at
@@ -89,14 +89,12 @@ def contour_scan(setup: LocalizerSetup, scan: Scan | None, scanner: int) -> Cont
 
 
 @compiled_inline
-def contour_scan_at(
-    scans: ContourScans | None, cycle: int, observations: FloatArray, sweeps: FloatArray
-) -> ContourScan | None:
-    """Scan of a cycle, or None where nobody looks at it.
+def contour_scan_at(scans: ContourScans, cycle: int, observations: FloatArray, sweeps: FloatArray) -> ContourScan:
+    """Scan of a cycle.
 
     Parameters
     ----------
-    scans : of the stretch, or None.
+    scans : of the stretch.
     cycle : in the stretch.
     observations, sweeps : see `observation_rows`, `sweep_rows`.
 
@@ -104,8 +102,6 @@ def contour_scan_at(
     -----
     No formula: a row of each column.
     """
-    if scans is None:
-        return None
     scanner = scans.scanners[cycle]
     sweep = sweep_at(sweeps, scanner) if len(sweeps) else Sweep(1.0, 0.0, 0.0, 0.0)
     return ContourScan(
@@ -117,22 +113,3 @@ def contour_scan_at(
         sweep,
         scans.beams[cycle],
     )
-
-
-@compiled_inline
-def figures_at(model: ContourModel | None, figures: FloatArray, cycle: int) -> FloatArray | None:
-    """Row of a cycle to write what became of its contours to, or None where they are not looked at.
-
-    Parameters
-    ----------
-    model : of the contours, or None.
-    figures : (K, COLUMNS) of the stretch.
-    cycle : in it.
-
-    Notes
-    -----
-    No formula: a row.
-    """
-    if model is None:
-        return None
-    return figures[cycle]

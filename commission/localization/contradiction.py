@@ -44,7 +44,7 @@ def contradiction(pose: PoseGaussian, trail: Trail, around: SearchMap) -> Contra
     mean of their noise: innovations of a filter that is right are white (Kailath 1968). What moves the pose by less
     than a part of the supervisor's limit is no contradiction.
     """
-    met = np.zeros((len(around.places), MET))
+    met = np.zeros((len(around.reflectors.places), MET))
     longest = max(float(trail.seen[:, 0].max()), 1.0)
     follow(
         pose,
@@ -54,12 +54,10 @@ def contradiction(pose: PoseGaussian, trail: Trail, around: SearchMap) -> Contra
         around.eyes,
         longest,
         around.crowd,
-        around.cells,
-        around.places,
-        around.offsets,
+        around.reflectors,
         met,
     )
-    survey = around.places[met[:, 0] >= FEWEST, 2]
+    survey = around.reflectors.places[met[:, 0] >= FEWEST, 2]
     met = met[met[:, 0] >= FEWEST]
     if not len(met):
         return Contradiction(0, 0, 0.0)

@@ -16,7 +16,15 @@ from commission.compiled import compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.geometry.directions import UnitVector, direction_of
 from commission.localization.association import INLIER, NOBODY, Gate
-from commission.localization.consider import BLOCKS, PER_REFLECTOR, Considering, considering
+from commission.localization.consider import (
+    BLOCKS,
+    PER_REFLECTOR,
+    Considering,
+    ConstantsRoom,
+    busy_of,
+    considering,
+    cross_of,
+)
 from commission.localization.consider_columns import busy_chunks, put_back, put_block, take_along
 from commission.localization.contour import (
     ACCEPTED,
@@ -36,9 +44,11 @@ from commission.localization.joint import NEAREST
 from commission.localization.observation import ObservationModel
 from commission.localization.odometry import Motion, NextOdometry, OdometryNoise, advance, reach
 from commission.localization.pose_gaussian import PoseGaussian
-from commission.localization.rejection import Evidence, rejects_the_world, weigh
+from commission.localization.reflector_index import ReflectorIndex
+from commission.localization.rejection import Evidence, count_detections, rejects_the_world, weigh
 from commission.localization.rival_poses import RivalPoses
 from commission.localization.scan_association import associate_by, prepare, with_mix
+from commission.localization.scan_rows import ScanRows
 from commission.localization.setup import FilterModel
 from commission.localization.several_scans import is_contested, keep_own
 from commission.localization.state import FilterState
@@ -95,33 +105,40 @@ def process_odometry(  # noqa: PLR0917 - one odometry record, number by number
     )
 
 
+class ContourLook(NamedTuple):
+    """A scan that is matched with the contours of the map."""
+
+    model: ContourModel
+    scan: ContourScan
+    figures: FloatArray
+    """(COLUMNS,) out, see `contour`."""
+
+
+class TemporaryLook(NamedTuple):
+    """A scan in which temporary landmarks are looked for."""
+
+    model: TemporaryModel
+    memory: TemporaryMemory
+    """Those that are known, written."""
+    scan: ContourScan
+    figures: FloatArray
+    """(COLUMNS,) out, see `temporary`."""
+
+
 @compiled_inline
-def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the whole run
+def process_scan(  # noqa: PLR0917 - a scan and all that it is looked at with
     state: FilterState,
     stamp_ns: int,
-    first: int,
-    last: int,
-    detections: FloatArray,
+    following: NextOdometry,
+    scanner: int,
+    rows: ScanRows,
     model: FilterModel,
     observation: ObservationModel,
-    places: FloatArray,
-    cell_offsets: IntArray,
-    cross: FloatArray | None,
-    work: FloatArray | None,
-    aims: FloatArray,
-    busy: IntArray | None,
-    scanner: int,
-    status: NDArray[np.int8],
-    reflectors: IntArray,
-    d2: FloatArray,
-    following: NextOdometry,
-    contours: ContourModel | None,
-    scan: ContourScan | None,
-    figures: FloatArray | None,
+    index: ReflectorIndex,
     zones: ZoneRows,
-    temporary: TemporaryModel | None,
-    memory: TemporaryMemory | None,
-    goods: FloatArray | None,
+    room: ConstantsRoom | None,
+    contours: ContourLook | None,
+    temporary: TemporaryLook | None,
     rivals: RivalPoses | None,
 ) -> Cycle:
     """Process the detections of a scan.
@@ -130,24 +147,16 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     ----------
     state : after everything before this scan.
     stamp_ns : of the scan [ns].
-    first, last : rows of the scan's detections, the last one excluded.
-    detections : (n, 2) measured range [m] and bearing [rad], scanner frame.
+    following : the odometry record at or after the scan, where it is known.
+    scanner : index of the scan's scanner.
+    rows : the scan's detections, in and out; afterwards, entries are indices into the reflector map.
     model : of the whole filter.
     observation : mounting and noise of the scan's scanner.
-    places, cell_offsets : the map, see `ReflectorIndex`.
-    cross : (3, 2 N + 5 S) in and out: covariance of the pose with the considered constants; None: none is considered.
-    work, aims : (3, 8 + 2 n), (n, 3) room for the largest scan, see `room_for_scans`; no work: as `cross`.
-    busy : see `busy_chunks`; None: as `cross`.
-    scanner : index of the scan's scanner.
-    status : (n,) in: INLIER or OUTLIER_DETECTOR; out: a `Status`.
-    reflectors : (n,) out: index into the reflector map, or -1.
-    d2 : (n,) out: squared Mahalanobis distance at the prior, NaN for none.
-    following : the odometry record at or after the scan, where it is known.
-    contours, scan : contours of the map, and the scan that is matched with them; None: they are not looked at.
-    figures : (COLUMNS,) out, see `contour`; None: as `contours`.
+    index : the map.
     zones : where which kinds correct the pose.
-    temporary, memory : rules of temporary landmarks, and those that are known, written; None: none are looked at.
-    goods : (COLUMNS,) out, see `temporary`; None: as `temporary`.
+    room : covariance of the pose with the considered constants, in and out; None: none is considered.
+    contours : the scan as they are matched with it; None: they are not looked at.
+    temporary : the scan as temporary landmarks are looked for in it; None: they are not.
     rivals : where the vehicle may stand as well, in and out; None: scans are decided on one by one.
 
     Notes
@@ -157,79 +166,29 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     and temporary landmarks after both.
     """
     prior, motion = reach(state.belief, state.motion, stamp_ns, following, model.odometry)
-    given = considering(cross, prior, state.pivot, state.motion, following, model.consider)
+    given = considering(room, prior, state.pivot, state.motion, following, model.consider)
     facing = direction_of(prior.theta)
     here = kinds_at(zones, prior.x, prior.y)
-    prepare(cross, given, work, aims, first, last, detections, observation, len(places), scanner)
+    prepare(rows, observation, given, len(index.places), scanner)
     prior, facing, given, mix = associate_by(
-        rivals,
-        here.reflectors,
-        prior,
-        facing,
-        first,
-        last,
-        detections,
-        aims,
-        observation,
-        model.gate,
-        model.cells,
-        places,
-        cell_offsets,
-        cross,
-        given,
-        work,
-        scanner,
-        status,
-        reflectors,
-        d2,
+        rivals, here.reflectors, prior, facing, rows, observation, model.gate, index, given, scanner
     )
-    posterior = corrected(
-        prior,
-        facing,
-        first,
-        last if here.reflectors else first,
-        detections,
-        aims,
-        observation,
-        model.gate,
-        places,
-        cross,
-        given,
-        work,
-        busy,
-        scanner,
-        status,
-        reflectors,
-    )
+    posterior = corrected(here.reflectors, prior, facing, rows, observation, model.gate, index.places, given, scanner)
     posterior = with_mix(rivals, posterior, mix)
     if here.contours:
         posterior = with_contours(
-            posterior, contours, scan, state, stamp_ns, motion, following, len(places), model, cross, busy, figures
+            posterior, contours, state, stamp_ns, motion, following, len(index.places), model, room
         )
-    posterior = with_temporary(
-        prior, posterior, temporary, memory, scan, state, motion, following, stamp_ns, model, cross, busy, goods
-    )
-    pivot = state.pivot if cross is None else (posterior.x, posterior.y)
-    for i in range(first, last):
-        if reflectors[i] != NOBODY:
-            reflectors[i] = int(places[reflectors[i], 3])
-    evidence = weigh(
-        state.evidence,
-        stamp_ns,
-        prior,
-        first,
-        last,
-        detections,
-        observation,
-        model.cells,
-        places,
-        cell_offsets,
-        status,
-        said_by_contours(figures),
-        model.rejection,
-    )
-    keep_own(rivals, posterior, said_by_contours(figures) == 1.0)
-    after = supervised(state, stamp_ns, posterior, motion, evidence, pivot, walls_after(state.walls, figures), model)
+    posterior = with_temporary(prior, posterior, temporary, state, motion, following, stamp_ns, model, room)
+    pivot = state.pivot if room is None else (posterior.x, posterior.y)
+    counted = count_detections(prior, rows, observation, index, model.rejection)
+    said = said_by_contours(contours)
+    for i in range(rows.first, rows.last):
+        if rows.entries[i] != NOBODY:
+            rows.entries[i] = int(index.places[rows.entries[i], 3])
+    evidence = weigh(state.evidence, stamp_ns, prior, counted, said, model.rejection)
+    keep_own(rivals, posterior, said == 1.0)
+    after = supervised(state, stamp_ns, posterior, motion, evidence, pivot, walls_after(state.walls, contours), model)
     return Cycle(prior, held_back(rivals, state, after, model))
 
 
@@ -381,36 +340,33 @@ def spread_where_lost(belief: PoseGaussian, seconds: float) -> PoseGaussian:
 @compiled_inline
 def with_contours(  # noqa: PLR0917 - the filter's state around one scan
     belief: PoseGaussian,
-    contours: ContourModel | None,
-    scan: ContourScan | None,
+    look: ContourLook | None,
     before: FilterState,
     stamp_ns: int,
     motion: Motion,
     following: NextOdometry,
     reflectors: int,
     model: FilterModel,
-    cross: FloatArray | None,
-    busy: IntArray | None,
-    figures: FloatArray | None,
+    room: ConstantsRoom | None,
 ) -> PoseGaussian:
     """Correct a belief by the contours of a scan, where they are looked at.
 
     Parameters
     ----------
     belief : after the reflectors of the scan.
-    contours, scan, figures : as in `process_scan`.
+    look : the scan; None: they are not looked at.
     before : state before the scan.
     stamp_ns : of the scan [ns].
     motion, following : odometry before the scan and after it.
     reflectors : N of the reflector map.
     model : of the whole filter.
-    cross, busy : covariance with the constants, about `belief`, or None.
+    room : covariance with the constants, about `belief`, or None.
 
     Notes
     -----
     No formula: `observe_contours`, and before it `spread_where_lost`.
     """
-    if contours is None or scan is None or figures is None:
+    if look is None:
         return belief
     if before.mode == LOST:
         belief = spread_where_lost(belief, 1e-9 * (stamp_ns - before.evidence.stamp_ns))
@@ -418,17 +374,17 @@ def with_contours(  # noqa: PLR0917 - the filter's state around one scan
     moved = math.sqrt(dx * dx + dy * dy)
     return observe_contours(
         belief,
-        scan,
-        contours,
+        look.scan,
+        look.model,
         motion,
         following,
         moved,
         before.walls,
         reflectors,
         model.consider,
-        cross,
-        busy,
-        figures,
+        cross_of(room),
+        busy_of(room),
+        look.figures,
         is_invariant(model.gate.kind),
         before.mode == LOST,
     )
@@ -438,17 +394,13 @@ def with_contours(  # noqa: PLR0917 - the filter's state around one scan
 def with_temporary(  # noqa: PLR0917 - the filter's state around one scan
     prior: PoseGaussian,
     belief: PoseGaussian,
-    temporary: TemporaryModel | None,
-    memory: TemporaryMemory | None,
-    scan: ContourScan | None,
+    look: TemporaryLook | None,
     before: FilterState,
     motion: Motion,
     following: NextOdometry,
     stamp_ns: int,
     model: FilterModel,
-    cross: FloatArray | None,
-    busy: IntArray | None,
-    goods: FloatArray | None,
+    room: ConstantsRoom | None,
 ) -> PoseGaussian:
     """Correct a belief by the temporary landmarks of a scan, where they are looked at.
 
@@ -456,44 +408,44 @@ def with_temporary(  # noqa: PLR0917 - the filter's state around one scan
     ----------
     prior : belief after *predict*.
     belief : after reflectors and contours.
-    temporary, memory, scan, goods : as in `process_scan`.
+    look : the scan; None: they are not looked at.
     before : state before the scan.
     motion, following : odometry before the scan and after it.
     stamp_ns : of the scan [ns].
     model : of the whole filter.
-    cross, busy : covariance with the constants, about `belief`, or None.
+    room : covariance with the constants, about `belief`, or None.
 
     Notes
     -----
     No formula: `observe_temporary`.
     """
-    if temporary is None or memory is None or scan is None or goods is None:
+    if look is None:
         return belief
     was_lost, invariant = before.mode == LOST, is_invariant(model.gate.kind)
     return observe_temporary(
         prior,
         belief,
         was_lost,
-        temporary,
-        memory,
-        scan,
+        look.model,
+        look.memory,
+        look.scan,
         motion,
         following,
         stamp_ns,
         invariant,
-        cross,
-        busy,
-        goods,
+        cross_of(room),
+        busy_of(room),
+        look.figures,
     )
 
 
 @compiled_inline
-def said_by_contours(figures: FloatArray | None) -> float:
+def said_by_contours(look: ContourLook | None) -> float:
     """What the contours of a scan say of the pose: 1 for it, 0.5 for a part of it, -1 against it, 0 nothing.
 
     Parameters
     ----------
-    figures : of the scan's contours, or None.
+    look : the scan, after it was looked at, or None.
 
     Notes
     -----
@@ -501,92 +453,76 @@ def said_by_contours(figures: FloatArray | None) -> float:
     everywhere along it;
     where they do not fit, the pose is wrong for all that.
     """
-    if figures is None:
+    if look is None:
         return 0.0
-    if figures[USE] == ACCEPTED:
-        return 1.0 if figures[ROWS] == WHOLE_POSE else 0.5
-    return -1.0 if figures[USE] == REJECTED or figures[USE] == CONTRADICTED else 0.0
+    use = look.figures[USE]
+    if use == ACCEPTED:
+        return 1.0 if look.figures[ROWS] == WHOLE_POSE else 0.5
+    return -1.0 if use in (REJECTED, CONTRADICTED) else 0.0
 
 
-class Room(NamedTuple):
-    """What `process_scan` writes to and reads from."""
-
-    aims: FloatArray
-    work: FloatArray | None
-    busy: IntArray | None
-
-
-def room_for_scans(cross: FloatArray | None, detections: int) -> Room:
-    """Return the room for scans of up to as many detections; work is None where no constants are considered."""
-    aims = np.empty((detections, 3))
+def constants_room(cross: FloatArray | None, detections: int) -> ConstantsRoom | None:
+    """Return the room for scans of up to as many detections; None where no constants are considered."""
     if cross is None:
-        return Room(aims, None, None)
-    return Room(aims, np.empty((3, BLOCKS + PER_REFLECTOR * max(detections, 1))), busy_chunks(cross))
+        return None
+    work = np.empty((3, BLOCKS + PER_REFLECTOR * max(detections, 1)))
+    return ConstantsRoom(cross, work, busy_chunks(cross))
 
 
 @compiled_inline
-def corrected(  # noqa: PLR0917 - the scan's detections and the map, array by array
+def corrected(  # noqa: PLR0917 - a scan at a belief
+    corrects: bool,
     prior: PoseGaussian,
     facing: UnitVector,
-    first: int,
-    last: int,
-    detections: FloatArray,
-    aims: FloatArray,
+    rows: ScanRows,
     observation: ObservationModel,
     gate: Gate,
     places: FloatArray,
-    cross: FloatArray | None,
     given: Considering | None,
-    work: FloatArray | None,
-    busy: IntArray | None,
     scanner: int,
-    status: NDArray[np.int8],
-    entries: IntArray,
 ) -> PoseGaussian:
     """Correct a belief, and its covariance with the considered constants, by all accepted detections of a scan.
 
     Parameters
     ----------
+    corrects : whether reflectors correct the pose here; where not, constants are only carried over the scan.
     prior, facing : after *predict*, and the direction of its heading.
-    first, last : rows of the scan's detections, the last one excluded.
-    detections : (n, 2) measured range [m] and bearing [rad], scanner frame.
-    aims : see `prepare`.
+    rows : the scan's detections, associated.
     observation : mounting and noise of the scanner.
     gate : of the association filter, which says of what kind the filter is, and whether two detections may be of one
         reflector.
     places : the map, see `ReflectorIndex`.
-    cross : covariance of the pose with the constants, written in place; None: none is considered.
-    given, work, busy : of the scan, where constants are considered, else None.
+    given : of the scan, where constants are considered, else None.
     scanner : index of the scanner.
-    status : (n,) a `Status` each.
-    entries : (n,) row of `places` of each, or NOBODY.
 
     Notes
     -----
     No formula: `correct_by` the kind of the filter for each in turn, from the freshest state; constants that the
     scan does not see are carried over it at the end, in one go.
     """
+    first, last, measured, aims, status, entries, _ = rows
+    last = last if corrects else first
     belief = prior
-    if cross is None or given is None or work is None or busy is None:
+    if given is None:
         for i in range(first, last):
             if status[i] == INLIER:
-                entry, distance = entries[i], detections[i, 0] - observation.range_bias
+                entry, distance = entries[i], measured[i, 0] - observation.range_bias
                 aim = UnitVector(aims[i - first, 0], aims[i - first, 1])
                 x, y, variance = places[entry, 0], places[entry, 1], places[entry, 2]
                 belief, facing = correct_by(
-                    gate.kind, belief, facing, distance, aim, x, y, variance, observation, None, None, 0, 0
+                    gate.kind, belief, facing, distance, aim, x, y, variance, observation, None, 0, 0
                 )
         return belief
     width = BLOCKS
     for i in range(first, last):
         if status[i] != INLIER:
             continue
-        entry, distance = entries[i], detections[i, 0] - observation.range_bias
+        entry, distance = entries[i], measured[i, 0] - observation.range_bias
         alone = gate.enabled and gate.method != NEAREST
         earlier = i if alone else _earlier(i, first, status, entries)
         if earlier == i:
             at = width
-            take_along(work, at, cross, entry)
+            take_along(given, at, entry)
             width += PER_REFLECTOR
         else:
             at = int(aims[earlier - first, 2])
@@ -594,12 +530,12 @@ def corrected(  # noqa: PLR0917 - the scan's detections and the map, array by ar
         aim = UnitVector(aims[i - first, 0], aims[i - first, 1])
         x, y, variance = places[entry, 0], places[entry, 1], places[entry, 2]
         belief, facing = correct_by(
-            gate.kind, belief, facing, distance, aim, x, y, variance, observation, given, work, width, at
+            gate.kind, belief, facing, distance, aim, x, y, variance, observation, given, width, at
         )
-    put_back(cross, work, len(places), scanner, busy)
+    put_back(given, len(places), scanner)
     for i in range(first, last):
         if status[i] == INLIER:
-            put_block(cross, work, int(aims[i - first, 2]), entries[i], busy)
+            put_block(given, int(aims[i - first, 2]), entries[i])
     return belief
 
 
@@ -617,18 +553,20 @@ def _earlier(i: int, first: int, status: NDArray[np.int8], entries: IntArray) ->
 
 
 @compiled_inline
-def walls_after(before: WallDepth, figures: FloatArray | None) -> WallDepth:
+def walls_after(before: WallDepth, look: ContourLook | None) -> WallDepth:
     """What is known of the walls' depth after a scan.
 
     Parameters
     ----------
     before : what was known.
-    figures : of the scan's contours, or None.
+    look : the scan, after its contours were looked at, or None.
 
     Notes
     -----
     No formula: an accepted scan has told, see `wall_depth.learned`.
     """
-    if figures is None or figures[USE] != ACCEPTED:
+    if look is None:
         return before
-    return WallDepth(figures[LEARNED_DEPTH], figures[LEARNED_INFORMATION])
+    if look.figures[USE] != ACCEPTED:
+        return before
+    return WallDepth(look.figures[LEARNED_DEPTH], look.figures[LEARNED_INFORMATION])

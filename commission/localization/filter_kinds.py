@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from commission.compiled import compiled_inline
-from commission.geometry.arrays import FloatArray
 from commission.geometry.directions import UnitVector, turn_to
 from commission.localization.consider import Considering, innovation_with, seen_with
 from commission.localization.consider_correction import correct_aimed_with
@@ -64,7 +63,6 @@ def innovation_by(  # noqa: PLR0917 - a measurement and a reflector, number by n
     offset_y: float,
     model: ObservationModel,
     given: Considering | None,
-    work: FloatArray | None,
     at: int,
 ) -> Innovation:
     """Innovation of a detection against one reflector, as the filter of a kind has it.
@@ -79,7 +77,7 @@ def innovation_by(  # noqa: PLR0917 - a measurement and a reflector, number by n
     x, y, surveyed_variance : the reflector's center [m], map frame, and variance of its place, each axis [m^2].
     offset_x, offset_y : see `scanner_offset` [m].
     model : of the observation.
-    given, work, at : as in `seen_with`, or None.
+    given, at : as in `seen_with`, or None.
 
     Notes
     -----
@@ -87,16 +85,16 @@ def innovation_by(  # noqa: PLR0917 - a measurement and a reflector, number by n
     """
     if kind is None:
         turn = turn_to(-expected.range_x, -expected.range_y, ray)
-        if given is None or work is None:
+        if given is None:
             return innovation(belief, expected, measured_range, turn, surveyed_variance, model)
-        seen = seen_with(facing, expected, surveyed_variance, given, work, at)
+        seen = seen_with(facing, expected, surveyed_variance, given, at)
         return innovation_with(belief, expected, measured_range, turn, model, seen)
     if kind == INVARIANT:
         return landing_innovation(
-            belief, facing, offset_x, offset_y, measured_range, ray, x, y, surveyed_variance, model, given, work, at
+            belief, facing, offset_x, offset_y, measured_range, ray, x, y, surveyed_variance, model, given, at
         )
     line = fitted(belief, facing, measured_range, aim, x, y, model, center_of(kind))
-    return fitted_innovation(belief, facing, measured_range, line, surveyed_variance, model, given, work, at)
+    return fitted_innovation(belief, facing, measured_range, line, surveyed_variance, model, given, at)
 
 
 @compiled_inline
@@ -111,7 +109,6 @@ def correct_by(  # noqa: PLR0917 - a measurement and a reflector, number by numb
     surveyed_variance: float,
     model: ObservationModel,
     given: Considering | None,
-    work: FloatArray | None,
     width: int,
     at: int,
 ) -> Corrected:
@@ -125,22 +122,18 @@ def correct_by(  # noqa: PLR0917 - a measurement and a reflector, number by numb
     aim : measured bearing as a direction, in base.
     x, y, surveyed_variance : the reflector's center [m], map frame, and variance of its place, each axis [m^2].
     model : of the observation.
-    given, work, width, at : as in `correct_aimed_with`, or None.
+    given, width, at : as in `correct_aimed_with`, or None.
 
     Notes
     -----
     No formula: that of the kind.
     """
     if kind is None:
-        if given is None or work is None:
+        if given is None:
             return correct_aimed(belief, facing, measured_range, aim, x, y, surveyed_variance, model)
-        return correct_aimed_with(
-            belief, facing, measured_range, aim, x, y, surveyed_variance, model, given, work, width, at
-        )
+        return correct_aimed_with(belief, facing, measured_range, aim, x, y, surveyed_variance, model, given, width, at)
     if kind == INVARIANT:
-        return correct_invariant(
-            belief, facing, measured_range, aim, x, y, surveyed_variance, model, given, work, width, at
-        )
+        return correct_invariant(belief, facing, measured_range, aim, x, y, surveyed_variance, model, given, width, at)
     return correct_by_points(
         belief,
         facing,
@@ -151,7 +144,6 @@ def correct_by(  # noqa: PLR0917 - a measurement and a reflector, number by numb
         surveyed_variance,
         model,
         given,
-        work,
         width,
         at,
         center_of(kind),

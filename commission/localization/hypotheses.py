@@ -59,9 +59,7 @@ def judged_again(search: Search, now_ns: int, around: SearchMap) -> Search:
             pairs_of(things),
             around.table.distances,
             around.table.ends,
-            around.cells,
-            around.places,
-            around.offsets,
+            around.reflectors,
             found,
         )
         poses = np.concatenate((poses, found[:count, :3]))
@@ -80,9 +78,7 @@ def judged_again(search: Search, now_ns: int, around: SearchMap) -> Search:
         clutter(things, search),
         prior_of(search, around),
         Sights(read_only(views), search.ends, around.eyes, around.walls, around.walled, around.facings, beams),
-        around.cells,
-        around.places,
-        around.offsets,
+        around.reflectors,
         judged,
     )
     return replace(search, hypotheses=read_only(_ranked(judged, search)))

@@ -15,7 +15,7 @@ from commission.compiled import compiled, compiled_inline
 from commission.geometry.angles import wrap_scalar
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.missed import SEEN, Sights, is_taken, log_missed
-from commission.localization.reflector_index import Cells, nearest_entry
+from commission.localization.reflector_index import ReflectorIndex, nearest_entry
 from commission.localization.wall_evidence import MOST_FOR, log_walls
 
 GATE = 11.8
@@ -77,9 +77,7 @@ def judge(  # noqa: PLR0917 - things, views and the map, array by array
     clutter: float,
     prior: Prior,
     sights: Sights,
-    cells: Cells,
-    places: FloatArray,
-    cell_offsets: IntArray,
+    index: ReflectorIndex,
     judged: FloatArray,
 ) -> None:
     """Fit each pose to all things by least squares, and weigh the evidence for it.
@@ -92,7 +90,7 @@ def judge(  # noqa: PLR0917 - things, views and the map, array by array
     clutter : density of things that are no reflectors [1 / m^2].
     prior : density of poses.
     sights : views from which reflectors should have been seen, and what hides them.
-    cells, places, cell_offsets : the map, see `ReflectorIndex`.
+    index : the map.
     judged : (H, ROW) out; the covariance is of the vehicle's pose.
 
     Notes
@@ -107,13 +105,13 @@ def judge(  # noqa: PLR0917 - things, views and the map, array by array
     most = -math.inf
     for h in range(len(poses)):
         x, y, t = poses[h, 0], poses[h, 1], poses[h, 2]
-        fit = _fit_step(x, y, t, things, base_x, base_y, clutter, 4.0, cells, places, cell_offsets, taken)
+        fit = _fit_step(x, y, t, things, base_x, base_y, clutter, 4.0, index, taken)
         for step in range(1, FIT_STEPS):
             if fit.fits < 2:
                 break
             x, y, t = _moved(x, y, t, fit, base_x, base_y)
             widen = 4.0 if step < 2 else 1.0
-            fit = _fit_step(x, y, t, things, base_x, base_y, clutter, widen, cells, places, cell_offsets, taken)
+            fit = _fit_step(x, y, t, things, base_x, base_y, clutter, widen, index, taken)
         judged[h, 0], judged[h, 1], judged[h, 2] = x, y, wrap_scalar(t)
         judged[h, 9], judged[h, 10], judged[h, 11], judged[h, 12] = -math.inf, fit.fits, 0.0, 0.0
         xx, xy, xt, yy, yt, tt, det = _inverse3(fit.xx, fit.xy, fit.xt, fit.yy, fit.yt, fit.tt)
@@ -128,7 +126,7 @@ def judge(  # noqa: PLR0917 - things, views and the map, array by array
         walls = log_walls(x, y, t, sights.beams, sights.walls)
         evidence += walls
         judged[h, 12] = max(walls - MOST_FOR, 0.0)
-        judged[h, 9] = evidence + log_missed(x, y, t, taken, sights, places, most - NEGLIGIBLE - evidence)
+        judged[h, 9] = evidence + log_missed(x, y, t, taken, sights, index.places, most - NEGLIGIBLE - evidence)
         most = max(most, judged[h, 9])
 
 
@@ -177,9 +175,7 @@ def _fit_step(  # noqa: PLR0917 - things and the map, array by array
     base_y: float,
     clutter: float,
     widen: float,
-    cells: Cells,
-    places: FloatArray,
-    cell_offsets: IntArray,
+    index: ReflectorIndex,
     taken: IntArray,
 ) -> Fit:
     """Associate all things at a pose, and sum up what they say of it; a gate `widen` times as large takes any."""
@@ -193,15 +189,16 @@ def _fit_step(  # noqa: PLR0917 - things and the map, array by array
         sxx = c * c * things[i, 2] - 2.0 * c * s * things[i, 3] + s * s * things[i, 4]
         sxy = c * s * (things[i, 2] - things[i, 4]) + (c * c - s * s) * things[i, 3]
         syy = s * s * things[i, 2] + 2.0 * c * s * things[i, 3] + c * c * things[i, 4]
-        reach = math.sqrt(widen * GATE * (max(sxx, syy) + abs(sxy) + cells.largest_variance))
-        best, _ = nearest_entry(x + px, y + py, min(reach, 1.5), cells, places, cell_offsets)
+        reach = math.sqrt(widen * GATE * (max(sxx, syy) + abs(sxy) + index.cells.largest_variance))
+        best, _ = nearest_entry(x + px, y + py, min(reach, 1.5), index)
         # Two things are not one reflector: the one that was seen more often comes first.
         if best < 0 or is_taken(best, taken, i):
             continue
-        sxx += places[best, 2]
-        syy += places[best, 2]
+        place = index.places[best]
+        sxx += place[2]
+        syy += place[2]
         area = sxx * syy - sxy * sxy
-        dx, dy = places[best, 0] - x - px, places[best, 1] - y - py
+        dx, dy = place[0] - x - px, place[1] - y - py
         d2 = (syy * dx * dx - 2.0 * sxy * dx * dy + sxx * dy * dy) / area
         gain = math.log(SEEN / (clutter * 2.0 * math.pi * math.sqrt(area))) - 0.5 * d2
         if d2 > widen * GATE or (widen == 1.0 and gain <= 0.0):

@@ -98,7 +98,6 @@ def landing_innovation(  # noqa: PLR0917 - a measurement and a reflector, number
     surveyed_variance: float,
     model: ObservationModel,
     given: Considering | None,
-    work: FloatArray | None,
     at: int,
 ) -> Innovation:
     """Innovation of a detection against one reflector, for gates: the residual may be large.
@@ -111,7 +110,7 @@ def landing_innovation(  # noqa: PLR0917 - a measurement and a reflector, number
     ray : bearing of the detection, as a direction of the map.
     x, y, surveyed_variance : the reflector's center [m], map frame, and variance of its place, each axis [m^2].
     model : of the observation.
-    given, work, at : as in `seen_with`, or None.
+    given, at : as in `seen_with`, or None.
 
     Notes
     -----
@@ -120,9 +119,9 @@ def landing_innovation(  # noqa: PLR0917 - a measurement and a reflector, number
     """
     seen = landing(belief.x + offset_x, belief.y + offset_y, ray, measured_range, x, y, belief.x, belief.y, 0.5)
     e = seen.expected
-    if given is None or work is None:
+    if given is None:
         return innovation(belief, e, measured_range, seen.turn, surveyed_variance, model)
-    constants = seen_with(facing, e, surveyed_variance, given, work, at)
+    constants = seen_with(facing, e, surveyed_variance, given, at)
     return innovation_with(belief, e, measured_range, seen.turn, model, constants)
 
 
@@ -187,7 +186,6 @@ def correct_invariant(  # noqa: PLR0917 - a measurement and a reflector, number 
     surveyed_variance: float,
     model: ObservationModel,
     given: Considering | None,
-    work: FloatArray | None,
     width: int,
     at: int,
 ) -> Corrected:
@@ -200,7 +198,7 @@ def correct_invariant(  # noqa: PLR0917 - a measurement and a reflector, number 
     aim : measured bearing as a direction, in base.
     reflector_x, reflector_y, surveyed_variance : the reflector's center [m], and variance of its place [m^2].
     model : of the observation.
-    given, work, width, at : as in `correct_aimed_with`, or None.
+    given, width, at : as in `correct_aimed_with`, or None.
 
     Notes
     -----
@@ -214,10 +212,10 @@ def correct_invariant(  # noqa: PLR0917 - a measurement and a reflector, number 
         ray = composed(turned, aim)
         seen = landing(from_x, from_y, ray, measured_range, reflector_x, reflector_y, belief.x, belief.y, 0.0)
         e = seen.expected
-        if given is None or work is None:
+        if given is None:
             v = innovation(belief, e, measured_range, seen.turn, surveyed_variance, model)
         else:
-            d = seen_with(turned, e, surveyed_variance, given, work, at)
+            d = seen_with(turned, e, surveyed_variance, given, at)
             v = innovation_with(belief, e, measured_range, seen.turn, model, d)
         k = gain(v)
         along, across = relinearized(e, seen, measured_range, shift)
@@ -226,12 +224,12 @@ def correct_invariant(  # noqa: PLR0917 - a measurement and a reflector, number 
         if abs(shift.turn - before) < SMALL_TURN or rounds == MOST_ROUNDS:
             break
         turned = turned_by(facing, shift.turn)
-    if given is None or work is None:
+    if given is None:
         xx, xy, xt, yy, yt, tt = corrected_covariance(belief, e, k, v.range_noise, v.bearing_noise)
     else:
-        d = seen_with(turned, e, surveyed_variance, given, work, at)
-        xx, xy, xt, yy, yt, tt = covariance_with(belief, e, k, v, d, 0.0, surveyed_variance, given, work, width, at)
-        carry_along(work, width, shift.x, shift.y)
+        d = seen_with(turned, e, surveyed_variance, given, at)
+        xx, xy, xt, yy, yt, tt = covariance_with(belief, e, k, v, d, 0.0, surveyed_variance, given, width, at)
+        carry_along(given.room.work, width, shift.x, shift.y)
     about = about_elsewhere(PoseGaussian(belief.x, belief.y, belief.theta, xx, xy, xt, yy, yt, tt), shift.x, shift.y)
     x, y, theta = about.x + shift.x, about.y + shift.y, wrap_scalar(belief.theta + shift.turn)
     after = PoseGaussian(x, y, theta, about.xx, about.xy, about.xt, about.yy, about.yt, about.tt)

@@ -9,7 +9,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from commission.compiled import compiled, compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray
@@ -22,7 +21,8 @@ from commission.localization.invariant import landing
 from commission.localization.kalman import squared_distance
 from commission.localization.observation import ObservationModel, expect_at
 from commission.localization.pose_gaussian import PoseGaussian
-from commission.localization.reflector_index import Cells, cell_range
+from commission.localization.reflector_index import ReflectorIndex, cell_range
+from commission.localization.scan_rows import ScanRows
 from commission.localization.search import Viewpoint, radius2_by
 from commission.site.parameters import ASSOCIATION_METHODS
 
@@ -97,20 +97,10 @@ def decide_together(  # noqa: PLR0917 - the scan's detections and the map, array
     facing: UnitVector,
     view: Viewpoint,
     reach: Viewpoint,
-    first: int,
-    last: int,
-    detections: FloatArray,
-    aims: FloatArray,
+    rows: ScanRows,
     model: ObservationModel,
-    cells: Cells,
-    places: FloatArray,
-    cell_offsets: IntArray,
-    cross: FloatArray | None,
+    index: ReflectorIndex,
     given: Considering | None,
-    work: FloatArray | None,
-    status: NDArray[np.int8],
-    entries: IntArray,
-    d2: FloatArray,
 ) -> None:
     """Decide anew on those detections of a scan that alone are inliers.
 
@@ -121,37 +111,20 @@ def decide_together(  # noqa: PLR0917 - the scan's detections and the map, array
     gates : of one detection, of two, and so on, jointly.
     belief, facing : after *predict*, and the direction of its heading.
     view, reach : scanner's place, and the bounds of the search.
-    first, last, detections, aims : as in `associate`.
-    model, cells, places, cell_offsets, cross, given, work : as in `associate`.
-    status, entries, d2 : (n,) in and out: as `associate` has them for each detection alone.
+    rows : in and out: as `associate` has them for each detection alone.
+    model, index, given : as in `associate`.
 
     Notes
     -----
     No formula: `leave_out`, or `most_compatible` of `MOST_JOINTLY` at once, those first that have rivals.
     """
+    first, last, measured, aims, status, entries, d2 = rows
     members = np.flatnonzero(status[first:last] == INLIER) + first
     found, chosen = no_rivals(len(members)), np.full(len(members), -1)
     for m in range(len(members)):
         i = members[m]
-        list_rivals(
-            found,
-            m,
-            kind,
-            gates[0],
-            belief,
-            facing,
-            view,
-            reach,
-            detections[i, 0] - model.range_bias,
-            UnitVector(aims[i - first, 0], aims[i - first, 1]),
-            model,
-            cells,
-            places,
-            cell_offsets,
-            cross,
-            given,
-            work,
-        )
+        distance, aim = measured[i, 0] - model.range_bias, UnitVector(aims[i - first, 0], aims[i - first, 1])
+        list_rivals(found, m, kind, gates[0], belief, facing, view, reach, distance, aim, model, index, given)
     if method == CAREFUL:
         leave_out(found, chosen)
     else:
@@ -206,12 +179,8 @@ def list_rivals(  # noqa: PLR0917 - a measurement, number by number, and the map
     measured_range: float,
     aim: UnitVector,
     model: ObservationModel,
-    cells: Cells,
-    places: FloatArray,
-    cell_offsets: IntArray,
-    cross: FloatArray | None,
+    index: ReflectorIndex,
     given: Considering | None,
-    work: FloatArray | None,
 ) -> None:
     """List the reflectors inside the gate of a detection, the likeliest first.
 
@@ -221,12 +190,13 @@ def list_rivals(  # noqa: PLR0917 - a measurement, number by number, and the map
     kind, gate_d2 : of the filter, and largest squared Mahalanobis distance.
     belief, facing, view, reach : what the detection is judged at, as in `associate`.
     measured_range, aim : range bias already taken off [m], and the bearing as a direction of base.
-    model, cells, places, cell_offsets, cross, given, work : as in `associate`.
+    model, index, given : as in `associate`.
 
     Notes
     -----
     d2 + ln(det S): Sobreira et al. 2016, Algorithm 3, line 4, with S that of the kind of the filter.
     """
+    cells, places, cell_offsets = index
     ray = composed(facing, aim)
     px = belief.x + view.offset_x + measured_range * ray.cos - cells.origin_x
     py = belief.y + view.offset_y + measured_range * ray.sin - cells.origin_y
@@ -240,8 +210,7 @@ def list_rivals(  # noqa: PLR0917 - a measurement, number by number, and the map
             x, y, variance = places[entry, 0], places[entry, 1], places[entry, 2]
             if math.hypot(x - cells.origin_x - px, y - cells.origin_y - py) > radius:
                 continue
-            if cross is not None and given is not None and work is not None:
-                take_out(work, BLOCKS, cross, entry, given)
+            take_out(given, BLOCKS, entry)
             dx, dy = x - (belief.x + view.offset_x), y - (belief.y + view.offset_y)
             e = expect_at(dx, dy, math.nan, view.offset_x, view.offset_y)
             turn = turn_to(-e.range_x, -e.range_y, ray)
@@ -260,7 +229,6 @@ def list_rivals(  # noqa: PLR0917 - a measurement, number by number, and the map
                 view.offset_y,
                 model,
                 given,
-                work,
                 BLOCKS,
             )
             if not squared_distance(v) <= gate_d2:
@@ -281,8 +249,8 @@ def list_rivals(  # noqa: PLR0917 - a measurement, number by number, and the map
                     noise[a, b] = variance * (H[a, 0] * H[b, 0] + H[a, 1] * H[b, 1])
             noise[0, 0] += model.range_variance
             noise[1, 1] += model.bearing_variance
-            if given is not None and work is not None:
-                d = seen_with(facing, e, variance, given, work, BLOCKS)
+            if given is not None:
+                d = seen_with(facing, e, variance, given, BLOCKS)
                 D, J, p = found.crossed[m, r], found.of_scanner[m, r], given.variances
                 D[0, 0], D[0, 1], D[1, 0], D[1, 1], D[2, 0], D[2, 1] = d.xr, d.xb, d.yr, d.yb, d.tr, d.tb
                 j = scanner_jacobian(facing, e, given.speed_x, given.speed_y, given.turn_rate)

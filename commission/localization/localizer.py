@@ -10,7 +10,6 @@ import math
 from collections import deque
 
 import numpy as np
-from numpy.typing import NDArray
 
 from commission.errors import SourceError
 from commission.geometry.arrays import FloatArray, IntArray, read_only
@@ -20,14 +19,21 @@ from commission.localization.bearings import entries_named
 from commission.localization.contour import COLUMNS
 from commission.localization.contour_scans import contour_scan
 from commission.localization.cross_covariance import columns_of, cross_covariance
-from commission.localization.cycle import Cycle, process_odometry, process_scan, room_for_scans
+from commission.localization.cycle import (
+    ContourLook,
+    Cycle,
+    TemporaryLook,
+    constants_room,
+    process_odometry,
+    process_scan,
+)
 from commission.localization.detector import DetectedReflectors, detect, room_for, status_of_reported
 from commission.localization.estimate import Belief, Estimate, Mode, SeenBearing, SeenTags
 from commission.localization.lasting import lasting_innovations, mean_rows
 from commission.localization.observation import project_detections
 from commission.localization.odometry import NOT_YET, NextOdometry, waits_until
 from commission.localization.pose_gaussian import to_belief
-from commission.localization.protected_cycle import supervised_by_level
+from commission.localization.protected_cycle import ProtectionRoom, supervised_by_level
 from commission.localization.protection_state import bank_of, protection_state
 from commission.localization.relocalization import (
     associate_nothing,
@@ -38,6 +44,7 @@ from commission.localization.relocalization import (
     unlocated,
 )
 from commission.localization.rival_poses import RivalPoses, kept_poses, poses_of
+from commission.localization.scan_rows import ScanRows
 from commission.localization.search_map import SearchMap, search_map
 from commission.localization.seen_of_late import SeenScan
 from commission.localization.setup import LocalizerSetup
@@ -289,6 +296,7 @@ class Localizer:
         status = seen.status.copy()
         reflector: IntArray = np.empty(count, dtype=np.int64)
         d2 = np.empty(count)
+        rows = ScanRows(0, count, read_only(detections), np.empty((count, 3)), status, reflector, d2)
         figures = None if self._setup.contour is None else np.zeros(COLUMNS)
         goods = None if self._setup.temporary is None else np.zeros(TEMPORARY_COLUMNS)
         tags, met = self._seen_tags(scan), self._seen_bearing(scan)
@@ -301,10 +309,9 @@ class Localizer:
         elif isinstance(scan, Reflex) and met is not None and met.figures is not None:
             cycle = self._met(scan, following, met.figures, goods)
         else:
-            cycle = self._filtered(scan, detections, following, (status, reflector, d2), (figures, goods))
+            cycle = self._filtered(scan, rows, following, figures, goods)
         if levels is not None and before.mode != Mode.INITIALIZING:
-            written = (read_only(detections), status, reflector)
-            cycle = Cycle(cycle.prior, self._by_level(before, cycle, scanner, written, levels))
+            cycle = Cycle(cycle.prior, self._by_level(before, cycle, scanner, rows, levels))
         self._state = cycle.state
         if not is_sought(before, self._setup.filter.limits):
             self._state = cycle.state._replace(search=None)
@@ -350,16 +357,10 @@ class Localizer:
         )
 
     def _by_level(
-        self,
-        before: FilterState,
-        cycle: Cycle,
-        scanner: int,
-        written: tuple[FloatArray, NDArray[np.int8], IntArray],
-        levels: FloatArray,
+        self, before: FilterState, cycle: Cycle, scanner: int, rows: ScanRows, levels: FloatArray
     ) -> FilterState:
         """Let the supervisor go by the protection level, which is written."""
         setup, after = self._setup, cycle.state
-        detections, status, reflectors = written
         bank = bank_of(before.protection, setup.protected_names)
         if setup.protection is None or bank is None:
             raise ValueError("protection levels are asked for where the supervisor goes by 2-sigma")
@@ -367,15 +368,10 @@ class Localizer:
         state = supervised_by_level(
             for_kernels(before),
             Cycle(cycle.prior, bare),
-            0,
-            len(detections),
-            detections,
-            status,
-            reflectors,
+            rows,
             setup.observations[scanner],
             setup.filter,
-            setup.protection,
-            bank,
+            ProtectionRoom(setup.protection, bank),
             levels,
             setup.zone_rows,
             poses_of(after.rivals, wanted=setup.decides_over_scans),
@@ -409,19 +405,15 @@ class Localizer:
         cycle = process_reflex(
             for_kernels(self._state),
             reflex.stamp_ns,
+            following,
             0,
             reflexes,
+            figures[np.newaxis],
             setup.filter,
             setup.index.places,
-            cross,
-            room_for_scans(cross, 0).busy,
-            following,
-            figures[np.newaxis],
             setup.zone_rows,
-            setup.temporary,
-            memory,
-            contour_scan(setup, None, 0),
-            goods,
+            constants_room(cross, 0),
+            self._temporary_look(None, 0, memory, goods),
             rivals,
         )
         after = self._with_arrays(cycle.state, cross, memory, rivals)
@@ -459,23 +451,15 @@ class Localizer:
         cycle = process_tags(
             for_kernels(self._state),
             frame.stamp_ns,
+            following,
             0,
             count,
             TagFrames(read_only(np.ones(1, np.bool_)), read_only(offsets), frame.sightings, entries, setup.tag_model),
-            setup.filter,
-            setup.observations[0],
-            setup.index.places,
-            setup.index.offsets,
-            cross,
-            room_for_scans(cross, 0).busy,
-            np.empty(0, np.int8),
-            following,
             figures,
+            setup.filter,
             setup.zone_rows,
-            setup.temporary,
-            memory,
-            contour_scan(setup, None, 0),
-            goods,
+            constants_room(cross, 0),
+            self._temporary_look(None, 0, memory, goods),
             rivals,
         )
         return Cycle(cycle.prior, self._with_arrays(cycle.state, cross, memory, rivals))
@@ -505,43 +489,46 @@ class Localizer:
             lasting=self._state.lasting,
         )
 
+    def _contour_look(self, scan: Scan | None, scanner: int, figures: FloatArray | None) -> ContourLook | None:
+        """A scan as contours are matched with it; None where they are not looked at."""
+        model, read = self._setup.contour, contour_scan(self._setup, scan, scanner)
+        return None if model is None or read is None or figures is None else ContourLook(model, read, figures)
+
+    def _temporary_look(
+        self, scan: Scan | None, scanner: int, memory: TemporaryMemory | None, figures: FloatArray | None
+    ) -> TemporaryLook | None:
+        """A scan as temporary landmarks are looked for in it; None where they are not."""
+        model, read = self._setup.temporary, contour_scan(self._setup, scan, scanner)
+        if model is None or memory is None or read is None or figures is None:
+            return None
+        return TemporaryLook(model, memory, read, figures)
+
     def _filtered(
         self,
-        scan: Scan | Detections | TagSightings | Reflex,
-        detections: FloatArray,
+        record: Scan | Detections | TagSightings | Reflex,
+        rows: ScanRows,
         following: NextOdometry,
-        written: tuple[NDArray[np.int8], IntArray, FloatArray],
-        figures: tuple[FloatArray | None, FloatArray | None],
+        figures: FloatArray | None,
+        goods: FloatArray | None,
     ) -> Cycle:
         """Let the filter process a scan; what becomes of its detections, contours and goods is written."""
-        beamless = isinstance(scan, TagSightings | Reflex)
-        constants, scanner = self._setup.constants, 0 if beamless else scan.scanner
-        cross = columns_of(self._state.cross, constants)
-        room, memory, rivals = room_for_scans(cross, len(detections)), self._memory(), self._rivals()
+        setup, scan = self._setup, record if isinstance(record, Scan) else None
+        scanner = 0 if isinstance(record, TagSightings | Reflex) else record.scanner
+        cross = columns_of(self._state.cross, setup.constants)
+        memory, rivals = self._memory(), self._rivals()
         cycle = process_scan(
             for_kernels(self._state),
-            scan.stamp_ns,
-            0,
-            len(detections),
-            detections,
-            self._setup.filter,
-            self._setup.observations[scanner],
-            self._setup.index.places,
-            self._setup.index.offsets,
-            cross,
-            room.work,
-            room.aims,
-            room.busy,
-            scanner,
-            *written,
+            record.stamp_ns,
             following,
-            self._setup.contour,
-            contour_scan(self._setup, scan if isinstance(scan, Scan) else None, scanner),
-            figures[0],
-            self._setup.zone_rows,
-            self._setup.temporary,
-            memory,
-            figures[1],
+            scanner,
+            rows,
+            setup.filter,
+            setup.observations[scanner],
+            setup.index,
+            setup.zone_rows,
+            constants_room(cross, rows.last),
+            self._contour_look(scan, scanner, figures),
+            self._temporary_look(scan, scanner, memory, goods),
             rivals,
         )
         return Cycle(cycle.prior, self._with_arrays(cycle.state, cross, memory, rivals))

@@ -6,35 +6,38 @@ Called by the same two: live, and by the compiled loop of whole runs; by neither
 from __future__ import annotations
 
 import math
-
-from numpy import int8
-from numpy.typing import NDArray
+from typing import NamedTuple
 
 from commission.compiled import compiled
-from commission.geometry.arrays import FloatArray, IntArray
+from commission.geometry.arrays import FloatArray
 from commission.localization.cycle import Cycle, held_back, with_mode
 from commission.localization.observation import ObservationModel
 from commission.localization.protection import Bank, ProtectionModel, forget, protect_cycle
 from commission.localization.rival_poses import RivalPoses
+from commission.localization.scan_rows import ScanRows
 from commission.localization.setup import FilterModel
 from commission.localization.state import FilterState
 from commission.localization.supervisor import FAIL, LOST, judge
 from commission.localization.zones import ZoneRows, kinds_at
 
 
+class ProtectionRoom(NamedTuple):
+    """What levels are reckoned with."""
+
+    model: ProtectionModel
+    """Map, integrity risk and probability of a fault."""
+    bank: Bank
+    """Filters that leave one reflector out each; in and out."""
+
+
 @compiled
 def supervised_by_level(  # noqa: PLR0917 - a cycle, and what it is written to
     before: FilterState,
     cycle: Cycle,
-    first: int,
-    last: int,
-    detections: FloatArray,
-    status: NDArray[int8],
-    reflectors: IntArray,
+    rows: ScanRows,
     observation: ObservationModel,
     model: FilterModel,
-    protection: ProtectionModel,
-    bank: Bank,
+    protected: ProtectionRoom,
     levels: FloatArray,
     zones: ZoneRows,
     rivals: RivalPoses | None,
@@ -45,12 +48,10 @@ def supervised_by_level(  # noqa: PLR0917 - a cycle, and what it is written to
     ----------
     before : state before the cycle.
     cycle : what it comes to by 2-sigma.
-    first, last : rows of the scan's detections, the last one excluded.
-    detections, status, reflectors : range [m] and bearing [rad], a `Status`, index into the reflector map.
+    rows : the scan's detections after it, see `process_scan`.
     observation : mounting and noise of the scan's scanner.
     model : of the whole filter.
-    protection : map, integrity risk and probability of a fault.
-    bank : filters that leave one reflector out each; in and out.
+    protected : what levels are reckoned with.
     levels : (2,) out: of the position [m] and of the heading [rad]; inf while the vehicle is lost.
     zones : where which kinds correct the pose.
     rivals : where the vehicle may stand as well, after the cycle, or None.
@@ -63,13 +64,21 @@ def supervised_by_level(  # noqa: PLR0917 - a cycle, and what it is written to
     after = cycle.state
     if LOST in (before.mode, after.mode):
         # What the filters without a reflector would begin from is what the vehicle was lost with.
-        forget(bank)
+        forget(protected.bank)
         levels[0], levels[1] = math.inf, math.inf
         return after if after.mode == LOST else with_mode(before, after, FAIL)
-    if not kinds_at(zones, cycle.prior.x, cycle.prior.y).reflectors:
-        last = first
+    last = rows.last if kinds_at(zones, cycle.prior.x, cycle.prior.y).reflectors else rows.first
     found = protect_cycle(
-        bank, cycle.prior, after.belief, first, last, detections, status, reflectors, observation, protection
+        protected.bank,
+        cycle.prior,
+        after.belief,
+        rows.first,
+        last,
+        rows.measured,
+        rows.status,
+        rows.entries,
+        observation,
+        protected.model,
     )
     levels[0], levels[1] = found.position, found.heading
     if after.evidence.confirmed < model.rejection.confirmations or after.evidence.lasting:

@@ -34,11 +34,7 @@ class Cells(NamedTuple):
 
 
 class ReflectorIndex(NamedTuple):
-    """Reflectors in the order of their cells, row by row.
-
-    The arrays are handed to kernels one by one, not in this tuple: each array that a kernel takes out of a tuple costs
-    two atomic operations, which were two thirds of the filter's time.
-    """
+    """Reflectors in the order of their cells, row by row."""
 
     cells: Cells
     places: FloatArray
@@ -103,21 +99,20 @@ def cell_range(low: float, high: float, per_metre: float, count: int) -> tuple[i
 
 
 @compiled_inline
-def nearest_entry(  # noqa: PLR0917 - a place and the map, array by array
-    x: float, y: float, reach: float, cells: Cells, places: FloatArray, cell_offsets: IntArray
-) -> tuple[int, float]:
+def nearest_entry(x: float, y: float, reach: float, index: ReflectorIndex) -> tuple[int, float]:
     """Row of the nearest reflector within reach, and its squared distance [m^2]; -1 where there is none.
 
     Parameters
     ----------
     x, y : the place [m], map frame.
     reach : radius of the search [m].
-    cells, places, cell_offsets : the map, see `ReflectorIndex`.
+    index : the map.
 
     Notes
     -----
     entry = argmin |place - reflector|, by definition.
     """
+    cells, places, cell_offsets = index
     px, py = x - cells.origin_x, y - cells.origin_y
     first_row, last_row = cell_range(py - reach, py + reach, cells.per_metre, cells.rows)
     first_column, last_column = cell_range(px - reach, px + reach, cells.per_metre, cells.columns)

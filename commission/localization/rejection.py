@@ -11,16 +11,13 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from commission.compiled import compiled_inline
-from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.association import INLIER, NOBODY, OUTLIER_ASSOCIATION
 from commission.localization.displacement import NO_PAIRS, tell_of_a_displacement, with_pair
 from commission.localization.observation import ObservationModel, scanner_offset
 from commission.localization.pose_gaussian import PoseGaussian, position_variance
-from commission.localization.reflector_index import Cells, nearest_entry
+from commission.localization.reflector_index import ReflectorIndex, nearest_entry
+from commission.localization.scan_rows import ScanRows
 from commission.site.parameters import SupervisorParameters
 
 CLEARED = 0.5
@@ -108,34 +105,80 @@ def rejection_rule(parameters: SupervisorParameters) -> RejectionRule:
     )
 
 
+class Counted(NamedTuple):
+    """Detections of one scan."""
+
+    accepted: float
+    rejected: float
+    """What an error explains that the supervisor allows is not among them, see `count_detections`."""
+    near: float
+    """Rejected although a reflector of the map is near."""
+
+
+NOTHING_COUNTED = Counted(0.0, 0.0, 0.0)
+
+
 @compiled_inline
-def weigh(  # noqa: PLR0917 - the scan's detections and the map, array by array
-    evidence: Evidence,
-    stamp_ns: int,
-    belief: PoseGaussian,
-    first: int,
-    last: int,
-    detections: FloatArray,
-    model: ObservationModel,
-    cells: Cells,
-    places: FloatArray,
-    cell_offsets: IntArray,
-    status: NDArray[np.int8],
-    contours: float,
-    rule: RejectionRule,
+def count_detections(
+    belief: PoseGaussian, rows: ScanRows, model: ObservationModel, index: ReflectorIndex, rule: RejectionRule
+) -> Counted:
+    """Count what became of a scan's detections.
+
+    Parameters
+    ----------
+    belief : that the detections were associated at.
+    rows : the scan's detections; what the detector filter rejected does not count.
+    model : of the observation.
+    index : the map.
+    rule : windows and limits.
+
+    Notes
+    -----
+    No formula: it counts. What an error explains that the supervisor allows does not (`is_harmless`), unless all that
+    is rejected near reflectors tells together of one that it does not allow: `tell_of_a_displacement`.
+    """
+    first, last, measured, _, status, _, _ = rows
+    accepted, rejected, near, excused, pairs, before = 0.0, 0.0, 0.0, 0.0, NO_PAIRS, NOBODY
+    for i in range(first, last):
+        if status[i] == INLIER:
+            accepted += 1.0
+        elif status[i] == OUTLIER_ASSOCIATION:
+            direction = belief.theta + model.mount_theta + measured[i, 1]
+            distance = measured[i, 0] - model.range_bias
+            offset_x, offset_y = scanner_offset(belief.theta, model)
+            qx = offset_x + distance * math.cos(direction)
+            qy = offset_y + distance * math.sin(direction)
+            x, y, reach = belief.x + qx, belief.y + qy, rule.reach + rule.turn * distance
+            entry, _ = nearest(x, y, reach, index)
+            if entry == NOBODY:
+                rejected += 1.0
+                continue
+            place = index.places[entry]
+            ex, ey, survey = place[0] - x, place[1] - y, place[2]
+            if is_harmless(qx, qy, ex, ey, model.range_variance + survey, rule):
+                excused += 1.0
+            else:
+                rejected, near = rejected + 1.0, near + 1.0
+            # Neighbors in a scan: of one reflector there is one detection, the others are of something else.
+            if entry != before:
+                variance = model.range_variance + distance * distance * model.bearing_variance + survey
+                pairs, before = with_pair(pairs, qx, qy, ex, ey, variance), entry
+    told = excused if excused > 0.0 and tell_of_a_displacement(pairs, rule.harmless, rule.harmless_turn) else 0.0
+    return Counted(accepted, rejected + told, near + told)
+
+
+@compiled_inline
+def weigh(  # noqa: PLR0917 - what a cycle has found, value by value
+    evidence: Evidence, stamp_ns: int, belief: PoseGaussian, counted: Counted, contours: float, rule: RejectionRule
 ) -> Evidence:
-    """Count what became of a scan's detections, and what its contours say.
+    """Evidence after a scan, by what became of its detections and by what its contours, or tags, say.
 
     Parameters
     ----------
     evidence : before the scan.
     stamp_ns : of the scan [ns].
     belief : that the detections were associated at.
-    first, last : rows of the scan's detections, the last one excluded.
-    detections : (n, 2) measured range [m] and bearing [rad], scanner frame.
-    model : of the observation.
-    cells, places, cell_offsets : the map, see `ReflectorIndex`.
-    status : (n,) a `Status` each; what the detector filter rejected does not count.
+    counted : detections of the scan.
     contours : 1 where they match and tell the whole pose, 0.5 where they tell a part of it, -1 where what they tell is
         rejected, else 0.
     rule : windows and limits.
@@ -149,36 +192,8 @@ def weigh(  # noqa: PLR0917 - the scan's detections and the map, array by array
     rejected near reflectors does, so that many of those still make the vehicle lost. A match counts as three accepted
     detections, and as one where the pose has to prove right. One that tells a part of the pose proves nothing; it
     takes back one scan that spoke against the pose.
-
-    What an error explains that the supervisor allows does not count (`is_harmless`), unless all that is rejected near
-    reflectors tells together of one that it does not allow: `tell_of_a_displacement`.
     """
-    accepted, rejected, near, excused, pairs, before = 0.0, 0.0, 0.0, 0.0, NO_PAIRS, NOBODY
-    for i in range(first, last):
-        if status[i] == INLIER:
-            accepted += 1.0
-        elif status[i] == OUTLIER_ASSOCIATION:
-            direction = belief.theta + model.mount_theta + detections[i, 1]
-            measured = detections[i, 0] - model.range_bias
-            offset_x, offset_y = scanner_offset(belief.theta, model)
-            qx = offset_x + measured * math.cos(direction)
-            qy = offset_y + measured * math.sin(direction)
-            x, y, reach = belief.x + qx, belief.y + qy, rule.reach + rule.turn * measured
-            entry, _ = nearest(x, y, reach, cells, places, cell_offsets)
-            if entry == NOBODY:
-                rejected += 1.0
-                continue
-            ex, ey, survey = places[entry, 0] - x, places[entry, 1] - y, places[entry, 2]
-            if is_harmless(qx, qy, ex, ey, model.range_variance + survey, rule):
-                excused += 1.0
-            else:
-                rejected, near = rejected + 1.0, near + 1.0
-            # Neighbors in a scan: of one reflector there is one detection, the others are of something else.
-            if entry != before:
-                variance = model.range_variance + measured * measured * model.bearing_variance + survey
-                pairs, before = with_pair(pairs, qx, qy, ex, ey, variance), entry
-    told = excused if excused > 0.0 and tell_of_a_displacement(pairs, rule.harmless, rule.harmless_turn) else 0.0
-    rejected, near = rejected + told, near + told
+    accepted, rejected, near = counted
     confirmed, against = evidence.confirmed, evidence.against
     doubtful = is_doubtful(belief, rule)
     matches = contours == 1.0 and not doubtful
@@ -283,23 +298,21 @@ def is_doubtful(prior: PoseGaussian, rule: RejectionRule) -> bool:
 
 
 @compiled_inline
-def nearest(  # noqa: PLR0917 - a place and the map, array by array
-    x: float, y: float, reach: float, cells: Cells, places: FloatArray, cell_offsets: IntArray
-) -> tuple[int, float]:
+def nearest(x: float, y: float, reach: float, index: ReflectorIndex) -> tuple[int, float]:
     """Row of the reflector that is nearest to a place, and its distance [m]; NOBODY and inf where none is in reach.
 
     Parameters
     ----------
     x, y : the place [m], map frame.
     reach : radius of the search [m].
-    cells, places, cell_offsets : the map, see `ReflectorIndex`.
+    index : the map.
 
     Notes
     -----
     d = min |place - reflector|, by definition.
     """
     # A little farther, so that what is exactly at `reach` is decided by its distance and not by its rounded square.
-    entry, square = nearest_entry(x, y, reach * (1.0 + 1e-9), cells, places, cell_offsets)
+    entry, square = nearest_entry(x, y, reach * (1.0 + 1e-9), index)
     distance = math.sqrt(square)
     return (entry, distance) if entry >= 0 and distance <= reach else (NOBODY, math.inf)
 

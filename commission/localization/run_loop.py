@@ -17,20 +17,27 @@ from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.localization.bearing_cycle import Reflexes, process_reflex
 from commission.localization.bearings import COLUMNS as BEARING_COLUMNS
 from commission.localization.bearings import entries_named
+from commission.localization.consider import ConstantsRoom
 from commission.localization.contour import COLUMNS as CONTOUR_COLUMNS
 from commission.localization.contour import ContourModel
-from commission.localization.contour_scans import ContourScans, contour_scan_at, contour_scans, figures_at
+from commission.localization.contour_scans import ContourScans, contour_scan_at, contour_scans
 from commission.localization.cross_covariance import columns_of, cross_covariance
-from commission.localization.cycle import process_odometry, process_scan, room_for_scans
+from commission.localization.cycle import (
+    ContourLook,
+    TemporaryLook,
+    constants_room,
+    process_odometry,
+    process_scan,
+)
 from commission.localization.detection_log import DetectionLog
 from commission.localization.lasting import lasting_innovations, mean_rows
 from commission.localization.observation import observation_at
-from commission.localization.odometry import NOT_YET, NextOdometry, waits_until
+from commission.localization.odometry import NOT_YET, NextOdometry, OdometryNoise, waits_until
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.priors import PriorRows
-from commission.localization.protected_cycle import supervised_by_level
-from commission.localization.protection import Bank, ProtectionModel
+from commission.localization.protected_cycle import ProtectionRoom, supervised_by_level
 from commission.localization.protection_state import bank_of, protection_state
+from commission.localization.reflector_index import ReflectorIndex
 from commission.localization.relocalization import (
     associate_nothing,
     is_sought,
@@ -40,6 +47,7 @@ from commission.localization.relocalization import (
 )
 from commission.localization.rival_poses import RivalPoses, kept_poses, poses_of
 from commission.localization.run_columns import RunColumns
+from commission.localization.scan_rows import ScanRows
 from commission.localization.search_map import SearchMap, search_map
 from commission.localization.search_state import SearchMoment
 from commission.localization.seen_of_late import SeenScan
@@ -379,7 +387,7 @@ def _tracked(
     names = tuple(each.id for each in setup.reflectors.reflectors)
     reflexes = _reflexes(setup, detected, mean_rows(state.lasting, names))
     settled = stretch.columns.settled
-    room = room_for_scans(cross, int(np.diff(detected.offsets).max(initial=0)))
+    most = int(np.diff(detected.offsets).max(initial=0))
     own = log.detection_stamps_ns
     scans = int(np.searchsorted(detected.stamps_ns, own[0])) if len(own) else len(detected)
     scans = 0 if state.sensor_detects else scans
@@ -387,35 +395,33 @@ def _tracked(
     numbers = np.arange(scans) if is_scan is None else np.flatnonzero(is_scan[:scans])
     before = stretch.first - detected.others_before
     after, cycles, delivered = _run(
-        read_only(log.odometry_stamps_ns[rows]),
-        read_only(as_driven(log.displacements[rows], setup.parameters.odometry)),
-        last - first,
-        detected.stamps_ns,
-        detected.offsets,
-        detected.range_bearing,
-        read_only(settled) if len(settled) else detected.range_bearing,
-        detected.scanners,
+        OdometryRows(
+            read_only(log.odometry_stamps_ns[rows]),
+            read_only(as_driven(log.displacements[rows], setup.parameters.odometry)),
+            last - first,
+        ),
+        CycleRows(
+            detected.stamps_ns,
+            detected.offsets,
+            detected.range_bearing,
+            read_only(settled) if len(settled) else detected.range_bearing,
+            detected.scanners,
+        ),
+        ScannerRows(setup.observation_rows, setup.sweep_rows),
         setup.filter,
-        setup.observation_rows,
-        setup.sweep_rows,
-        setup.index.places,
-        setup.index.offsets,
-        cross,
-        room.work,
-        room.aims,
-        room.busy,
+        setup.index,
+        setup.zone_rows,
+        np.empty((most, 3)),
+        constants_room(cross, most),
         for_kernels(state),
         stretch.columns,
         stretch.priors,
         setup.contour,
+        None if setup.temporary is None or memory is None else TemporaryRules(setup.temporary, memory),
         contour_scans(log, setup, (before, numbers), len(detected)),
         _frames(setup, detected),
         reflexes,
-        setup.zone_rows,
-        setup.protection,
-        bank,
-        setup.temporary,
-        memory,
+        None if setup.protection is None or bank is None else ProtectionRoom(setup.protection, bank),
         rivals,
     )
     # Odometry alone changes nothing of it, nor does another setup before its first scan.
@@ -449,183 +455,219 @@ def _reflexes(setup: LocalizerSetup, detected: DetectionLog, lasting: FloatArray
     return Reflexes(met.is_reflex, read_only(met.numbers - met.first), met.bearings, entries, model, lasting)
 
 
+class OdometryRows(NamedTuple):
+    """Odometry of a stretch, for the loop."""
+
+    stamps_ns: IntArray
+    """(n,) [ns]; the row behind those that are delivered only tells the motion of scans before it."""
+    displacements: FloatArray
+    """(n, 3) [m, m, rad], with what is known of the wheels."""
+    delivered: int
+    """Rows that are."""
+
+
+class CycleRows(NamedTuple):
+    """Cycles of a stretch, for the loop."""
+
+    stamps_ns: IntArray
+    """(K,) [ns]."""
+    offsets: IntArray
+    """(K + 1,) detections of cycle k: offsets[k] to offsets[k + 1]."""
+    measured: FloatArray
+    """(n, 2) range [m] and bearing [rad] of each detection, scanner frame."""
+    detections: FloatArray
+    """(n, 2) the same at the stamp of the scan: where there are sweeps, a view of the column `settled`, which is
+    written before it is read."""
+    scanners: IntArray
+    """(K,) index of the scanner of each cycle."""
+
+
+class ScannerRows(NamedTuple):
+    """Scanners, for the loop."""
+
+    observations: FloatArray
+    """(S, 6) see `observation_rows`."""
+    sweeps: FloatArray
+    """(S, 4) see `sweep_rows`; (0, 4) where all measure at once and upright."""
+
+
+class TemporaryRules(NamedTuple):
+    """What temporary landmarks are looked for with."""
+
+    model: TemporaryModel
+    memory: TemporaryMemory
+    """Those that are known, written."""
+
+
 @compiled
-def _run(  # noqa: PLR0917 - the columns of the log
-    odometry_stamps: IntArray,
-    displacements: FloatArray,
-    delivered: int,
-    scan_stamps: IntArray,
-    offsets: IntArray,
-    measured: FloatArray,
-    detections: FloatArray,
-    scanners: IntArray,
+def _run(  # noqa: PLR0917 - a stretch and all that it is looked at with
+    odometry: OdometryRows,
+    cycles: CycleRows,
+    scanners: ScannerRows,
     model: FilterModel,
-    observations: FloatArray,
-    sweeps: FloatArray,
-    places: FloatArray,
-    cell_offsets: IntArray,
-    cross: FloatArray | None,
-    work: FloatArray | None,
+    index: ReflectorIndex,
+    zones: ZoneRows,
     aims: FloatArray,
-    busy: IntArray | None,
+    room: ConstantsRoom | None,
     state: FilterState,
     columns: Columns,
     priors: PriorRows,
     contours: ContourModel | None,
+    temporary: TemporaryRules | None,
     scans: ContourScans | None,
     frames: TagFrames | None,
     reflexes: Reflexes | None,
-    zones: ZoneRows,
-    protection: ProtectionModel | None,
-    bank: Bank | None,
-    temporary: TemporaryModel | None,
-    memory: TemporaryMemory | None,
+    protected: ProtectionRoom | None,
     rivals: RivalPoses | None,
 ) -> tuple[FilterState, int, int]:
     """Deliver odometry and scans in the order of their stamps, odometry first, until the vehicle is lost.
 
     Returns the state after the last record, and how many scans and rows of odometry were delivered.
-
-    Of the odometry the rows up to `delivered`; the one behind them only tells the motion of scans before it. Where
-    there are sweeps, `detections` is a view of the column `settled`, which is written before it is read.
     """
-    means, covariances, modes, status, reflectors, d2, settled, figures, sightings, levels, goods, met = columns
-    rows = 0
-    for k in range(len(scan_stamps)):
-        while rows < delivered and odometry_stamps[rows] <= scan_stamps[k]:
-            dx, dy, dtheta = displacements[rows, 0], displacements[rows, 1], displacements[rows, 2]
-            state = process_odometry(state, odometry_stamps[rows], dx, dy, dtheta, model.odometry)
-            rows += 1
-        following = NextOdometry(False, 0, 0.0, 0.0, 0.0)
-        if rows < len(odometry_stamps) and odometry_stamps[rows] <= waits_until(state.motion, scan_stamps[k]):
-            dx, dy, dtheta = displacements[rows, 0], displacements[rows, 1], displacements[rows, 2]
-            following = NextOdometry(True, odometry_stamps[rows], dx, dy, dtheta)
-        observation = observation_at(observations, scanners[k])
+    stamps_ns, offsets, measured, detections, numbers = cycles
+    observations, sweeps = scanners
+    delivered = 0
+    for k in range(len(stamps_ns)):
+        while delivered < odometry.delivered and odometry.stamps_ns[delivered] <= stamps_ns[k]:
+            state = _with_odometry(state, odometry, delivered, model.odometry)
+            delivered += 1
+        following = _following(odometry, delivered, waits_until(state.motion, stamps_ns[k]))
+        observation = observation_at(observations, numbers[k])
+        rows = ScanRows(offsets[k], offsets[k + 1], detections, aims, columns.status, columns.reflectors, columns.d2)
+        looked = temporary_look(temporary, scans, columns.temporary, k, scanners)
         if frames is not None and frames.is_frame[k]:
+            first, last = frames.offsets[k], frames.offsets[k + 1]
             cycle = process_tags(
                 state,
-                scan_stamps[k],
-                frames.offsets[k],
-                frames.offsets[k + 1],
-                frames,
-                model,
-                observation,
-                places,
-                cell_offsets,
-                cross,
-                busy,
-                status,
+                stamps_ns[k],
                 following,
-                sightings,
+                first,
+                last,
+                frames,
+                columns.tags,
+                model,
                 zones,
-                temporary,
-                memory,
-                contour_scan_at(scans, k, observations, sweeps),
-                goods_at(temporary, goods, k),
+                room,
+                looked,
                 rivals,
             )
         elif reflexes is not None and reflexes.is_reflex[k]:
             cycle = process_reflex(
                 state,
-                scan_stamps[k],
+                stamps_ns[k],
+                following,
                 reflexes.rows[k],
                 reflexes,
+                columns.bearings,
                 model,
-                places,
-                cross,
-                busy,
-                following,
-                met,
+                index.places,
                 zones,
-                temporary,
-                memory,
-                contour_scan_at(scans, k, observations, sweeps),
-                goods_at(temporary, goods, k),
+                room,
+                looked,
                 rivals,
             )
         else:
-            first, last = offsets[k], offsets[k + 1]
             if len(sweeps):
-                sweep = sweep_at(sweeps, scanners[k])
+                sweep = sweep_at(sweeps, numbers[k])
                 bring_to_stamp(
-                    state.motion, following, offsets[k], offsets[k + 1], measured, sweep, observation, settled
+                    state.motion, following, offsets[k], offsets[k + 1], measured, sweep, observation, columns.settled
                 )
             cycle = process_scan(
                 state,
-                scan_stamps[k],
-                first,
-                last,
-                detections,
-                model,
-                observation,
-                places,
-                cell_offsets,
-                cross,
-                work,
-                aims,
-                busy,
-                scanners[k],
-                status,
-                reflectors,
-                d2,
+                stamps_ns[k],
                 following,
-                contours,
-                contour_scan_at(scans, k, observations, sweeps),
-                figures_at(contours, figures, k),
-                zones,
-                temporary,
-                memory,
-                goods_at(temporary, goods, k),
-                rivals,
-            )
-        if protection is not None and bank is not None:
-            state = supervised_by_level(
-                state,
-                cycle,
-                offsets[k],
-                offsets[k + 1],
-                detections,
-                status,
-                reflectors,
-                observation,
+                numbers[k],
+                rows,
                 model,
-                protection,
-                bank,
-                levels[k],
+                observation,
+                index,
                 zones,
+                room,
+                contour_look(contours, scans, columns.contours, k, scanners),
+                looked,
                 rivals,
             )
+        if protected is not None:
+            levels = columns.levels[k]
+            state = supervised_by_level(state, cycle, rows, observation, model, protected, levels, zones, rivals)
         else:
             state = cycle.state
         _write_belief(cycle.prior, k, priors.means, priors.covariances)
-        _write_belief(state.belief, k, means, covariances)
-        modes[k] = state.mode
+        _write_belief(state.belief, k, columns.means, columns.covariances)
+        columns.modes[k] = state.mode
         if state.mode == LOST and model.limits.find_again:
-            return state, k + 1, rows
-    while rows < delivered:
-        dx, dy, dtheta = displacements[rows, 0], displacements[rows, 1], displacements[rows, 2]
-        state = process_odometry(state, odometry_stamps[rows], dx, dy, dtheta, model.odometry)
-        rows += 1
-    return state, len(scan_stamps), rows
+            return state, k + 1, delivered
+    while delivered < odometry.delivered:
+        state = _with_odometry(state, odometry, delivered, model.odometry)
+        delivered += 1
+    return state, len(stamps_ns), delivered
 
 
 @compiled_inline
-def goods_at(temporary: TemporaryModel | None, goods: FloatArray, cycle: int) -> FloatArray | None:
-    """Row of a cycle to write what became of its temporary landmarks to, or None where they are not looked at.
+def _with_odometry(state: FilterState, odometry: OdometryRows, row: int, noise: OdometryNoise) -> FilterState:
+    """State after a row of odometry."""
+    moved = odometry.displacements
+    return process_odometry(state, odometry.stamps_ns[row], moved[row, 0], moved[row, 1], moved[row, 2], noise)
+
+
+@compiled_inline
+def _following(odometry: OdometryRows, row: int, until_ns: int) -> NextOdometry:
+    """A row of odometry as the one that follows a scan, where it comes in time."""
+    if row < len(odometry.stamps_ns) and odometry.stamps_ns[row] <= until_ns:
+        moved = odometry.displacements
+        return NextOdometry(True, odometry.stamps_ns[row], moved[row, 0], moved[row, 1], moved[row, 2])
+    return NextOdometry(False, 0, 0.0, 0.0, 0.0)
+
+
+@compiled_inline
+def contour_look(
+    model: ContourModel | None, scans: ContourScans | None, figures: FloatArray, cycle: int, scanners: ScannerRows
+) -> ContourLook | None:
+    """Scan of a cycle as contours are matched with it, or None where they are not looked at.
 
     Parameters
     ----------
-    temporary : rules of temporary landmarks, or None.
-    goods : (K, COLUMNS) of the stretch.
+    model : of the contours, or None.
+    scans : of the stretch, or None.
+    figures : (K, COLUMNS) of the stretch.
     cycle : in it.
+    scanners : of the vehicle.
 
     Notes
     -----
-    No formula: a row.
+    No formula: a row of each column.
     """
-    if temporary is None:
+    if model is None:
         return None
-    return goods[cycle]
+    if scans is None:
+        return None
+    return ContourLook(model, contour_scan_at(scans, cycle, scanners.observations, scanners.sweeps), figures[cycle])
+
+
+@compiled_inline
+def temporary_look(
+    rules: TemporaryRules | None, scans: ContourScans | None, figures: FloatArray, cycle: int, scanners: ScannerRows
+) -> TemporaryLook | None:
+    """Scan of a cycle as temporary landmarks are looked for in it, or None where they are not.
+
+    Parameters
+    ----------
+    rules : what they are looked for with, or None.
+    scans : of the stretch, or None.
+    figures : (K, COLUMNS) of the stretch.
+    cycle : in it.
+    scanners : of the vehicle.
+
+    Notes
+    -----
+    No formula: a row of each column.
+    """
+    if rules is None:
+        return None
+    if scans is None:
+        return None
+    scan = contour_scan_at(scans, cycle, scanners.observations, scanners.sweeps)
+    return TemporaryLook(rules.model, rules.memory, scan, figures[cycle])
 
 
 @compiled_inline

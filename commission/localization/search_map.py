@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import KDTree
 
-from commission.geometry.arrays import FloatArray, IntArray, read_only
+from commission.geometry.arrays import FloatArray, read_only
 from commission.geometry.ray_kernels import RayTables
 from commission.localization.lasting import HARMLESS
 from commission.localization.odometry import OdometryNoise
 from commission.localization.pose_gaussian import PoseGaussian
-from commission.localization.reflector_index import Cells
+from commission.localization.reflector_index import ReflectorIndex
 from commission.localization.setup import LocalizerSetup
 from commission.localization.start import MARGIN, DistanceTable, pair_table
 from commission.site.reflectors import ReflectorKind
@@ -28,10 +28,7 @@ class SearchMap(NamedTuple):
 
     table: DistanceTable
     """All pairs of reflectors."""
-    cells: Cells
-    places: FloatArray
-    offsets: IntArray
-    """See `ReflectorIndex`."""
+    reflectors: ReflectorIndex
     facings: FloatArray
     """(N,) direction that the reflector of each row of `places` faces [rad]; NaN: seen from all sides."""
     eyes: FloatArray
@@ -70,9 +67,7 @@ def search_map(setup: LocalizerSetup) -> SearchMap:
     longest = 2.0 * max((eye[4] for eye in eyes), default=1.0)
     return SearchMap(
         pair_table(index.places, longest),
-        index.cells,
-        index.places,
-        index.offsets,
+        index,
         read_only(facings),
         read_only(np.array(eyes, dtype=np.float64).reshape(-1, 5)),
         walls_of(setup.floor).tables,

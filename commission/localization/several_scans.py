@@ -11,7 +11,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from commission.compiled import compiled, compiled_inline
 from commission.geometry.angles import wrap_scalar
@@ -23,8 +22,9 @@ from commission.localization.joint import MOST_RIVALS, Rivals, list_rivals, no_r
 from commission.localization.kalman import correct
 from commission.localization.observation import ObservationModel
 from commission.localization.pose_gaussian import PoseGaussian, pose_in, write_pose
-from commission.localization.reflector_index import Cells
+from commission.localization.reflector_index import ReflectorIndex
 from commission.localization.rival_poses import MOST_POSES, RivalPoses
+from commission.localization.scan_rows import ScanRows
 from commission.localization.search import viewpoint
 from commission.localization.supervisor import SupervisorLimits
 
@@ -106,19 +106,13 @@ def _room(rows: int, detections: int) -> Branches:
 
 
 @compiled
-def decide_over_scans(  # noqa: PLR0917 - the scan's detections and the map, array by array
+def decide_over_scans(  # noqa: PLR0917 - a scan at several poses
     poses: RivalPoses,
     prior: PoseGaussian,
-    first: int,
-    last: int,
-    detections: FloatArray,
-    aims: FloatArray,
-    status: NDArray[np.int8],
+    rows: ScanRows,
     model: ObservationModel,
     gate_d2: float,
-    cells: Cells,
-    places: FloatArray,
-    cell_offsets: IntArray,
+    index: ReflectorIndex,
     given: Considering | None,
     chosen: IntArray,
 ) -> Decision:
@@ -128,10 +122,10 @@ def decide_over_scans(  # noqa: PLR0917 - the scan's detections and the map, arr
     ----------
     poses : rivals, in and out: those that are left, after the scan.
     prior : the run's own pose after *predict*.
-    first, last, detections, aims, status : as in `associate`.
+    rows : the scan's detections; what becomes of them is not written.
     model : of the observation.
     gate_d2 : largest squared Mahalanobis distance of one detection.
-    cells, places, cell_offsets : the map, see `ReflectorIndex`.
+    index : the map.
     given : of the scan, where constants are considered, else None.
     chosen : (n,) out: row of `places` of each of the scan's detections, or NOBODY.
 
@@ -140,6 +134,7 @@ def decide_over_scans(  # noqa: PLR0917 - the scan's detections and the map, arr
     ln w += ln(P_D / (2 pi lambda)) - (d2 + ln det S) / 2 of a detection that is of a reflector, nothing where it is of
     none: Reid 1979, equation 16. The freshest state of each pose counts, so that a scan is decided on jointly.
     """
+    first, last, measured, aims, status, _, _ = rows
     now, after = _room(MOST_POSES, last - first), _room(MOST_POSES * (1 + MOST_RIVALS), last - first)
     write_pose(now.beliefs[0], prior)
     count = 1 + _carry_along(poses, prior, now)
@@ -149,27 +144,12 @@ def decide_over_scans(  # noqa: PLR0917 - the scan's detections and the map, arr
     for i in range(first, last):
         if status[i] != INLIER:
             continue
-        measured = detections[i, 0] - model.range_bias
-        seen = noise_with(model, given, measured)
+        distance, bearing, detection = measured[i, 0] - model.range_bias, measured[i, 1], i - first
+        seen = noise_with(model, given, distance)
         aim = UnitVector(aims[i - first, 0], aims[i - first, 1])
         grown = 0
         for h in range(count):
-            grown = _branch(
-                now,
-                h,
-                i - first,
-                measured,
-                detections[i, 1],
-                aim,
-                seen,
-                gate_d2,
-                cells,
-                places,
-                cell_offsets,
-                found,
-                after,
-                grown,
-            )
+            grown = _branch(now, h, detection, distance, bearing, aim, seen, gate_d2, index, found, after, grown)
         count = _left(after, grown, now)
     told = 0
     for h in range(1, count):
@@ -179,7 +159,7 @@ def decide_over_scans(  # noqa: PLR0917 - the scan's detections and the map, arr
     for i in range(last - first):
         chosen[i] = now.entries[told, i]
     root = now.roots[told]
-    mix = _mix_of(now, told, roots[root], first, last, detections, status, model, given, places)
+    mix = _mix_of(now, told, roots[root], rows, model, given, index.places)
     _remember(poses, now, count, told)
     return Decision(root != 0, pose_in(roots[root]), mix)
 
@@ -295,9 +275,7 @@ def _branch(  # noqa: PLR0917 - a pose, a detection and the map
     aim: UnitVector,
     model: ObservationModel,
     gate_d2: float,
-    cells: Cells,
-    places: FloatArray,
-    cell_offsets: IntArray,
+    index: ReflectorIndex,
     found: Rivals,
     after: Branches,
     grown: int,
@@ -307,25 +285,7 @@ def _branch(  # noqa: PLR0917 - a pose, a detection and the map
     facing = direction_of(belief.theta)
     view = viewpoint(belief, facing, model)
     found.number[0] = 0
-    list_rivals(
-        found,
-        0,
-        None,
-        gate_d2,
-        belief,
-        facing,
-        view,
-        view,
-        measured_range,
-        aim,
-        model,
-        cells,
-        places,
-        cell_offsets,
-        None,
-        None,
-        None,
-    )
+    list_rivals(found, 0, None, gate_d2, belief, facing, view, view, measured_range, aim, model, index, None)
     for r in range(-1, found.number[0]):
         entry = NOBODY if r < 0 else found.entry[0, r]
         taken = False
@@ -336,7 +296,7 @@ def _branch(  # noqa: PLR0917 - a pose, a detection and the map
         _copy(now, h, after, grown)
         after.entries[grown, detection] = entry
         if entry != NOBODY:
-            place = places[entry]
+            place = index.places[entry]
             corrected = correct(belief, measured_range, bearing, place[0], place[1], place[2], model)
             write_pose(after.beliefs[grown], corrected)
             after.weights[grown] += math.log(SEEN_PER_FALSE / (2.0 * math.pi)) - 0.5 * found.cost[0, r]
@@ -424,10 +384,7 @@ def _mix_of(  # noqa: PLR0917 - a branch and its detections
     now: Branches,
     told: int,
     root: FloatArray,
-    first: int,
-    last: int,
-    detections: FloatArray,
-    status: NDArray[np.int8],
+    rows: ScanRows,
     model: ObservationModel,
     given: Considering | None,
     places: FloatArray,
@@ -437,12 +394,12 @@ def _mix_of(  # noqa: PLR0917 - a branch and its detections
     if not (spread[0] > 0.0 or spread[3] > 0.0 or spread[5] > 0.0):
         return no_mix()
     alone = pose_in(root)
-    for i in range(first, last):
-        entry = now.entries[told, i - first]
-        if status[i] == INLIER and entry != NOBODY:
-            measured = detections[i, 0] - model.range_bias
-            seen, place = noise_with(model, given, measured), places[entry]
-            alone = correct(alone, measured, detections[i, 1], place[0], place[1], place[2], seen)
+    for i in range(rows.first, rows.last):
+        entry = now.entries[told, i - rows.first]
+        if rows.status[i] == INLIER and entry != NOBODY:
+            distance = rows.measured[i, 0] - model.range_bias
+            seen, place = noise_with(model, given, distance), places[entry]
+            alone = correct(alone, distance, rows.measured[i, 1], place[0], place[1], place[2], seen)
     pose = now.beliefs[told]
     return Mix(
         pose[0] - alone.x,

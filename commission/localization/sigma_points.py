@@ -190,7 +190,6 @@ def fitted_innovation(  # noqa: PLR0917 - a measurement and a reflector, number 
     surveyed_variance: float,
     model: ObservationModel,
     given: Considering | None,
-    work: FloatArray | None,
     at: int,
 ) -> Innovation:
     """Innovation of a detection against one reflector, by a line through sigma points.
@@ -202,16 +201,16 @@ def fitted_innovation(  # noqa: PLR0917 - a measurement and a reflector, number 
     line : see `fitted`.
     surveyed_variance : of the reflector's place, each axis [m^2].
     model : of the observation.
-    given, work, at : as in `seen_with`, or None.
+    given, at : as in `seen_with`, or None.
 
     Notes
     -----
     No formula: `innovation` or `innovation_with`, and `widened_by`.
     """
     e = line.expected
-    if given is None or work is None:
+    if given is None:
         return widened_by(innovation(belief, e, measured_range, line.turn, surveyed_variance, model), line, model)
-    constants = seen_with(facing, e, surveyed_variance, given, work, at)
+    constants = seen_with(facing, e, surveyed_variance, given, at)
     return widened_by(innovation_with(belief, e, measured_range, line.turn, model, constants), line, model)
 
 
@@ -226,7 +225,6 @@ def correct_by_points(  # noqa: PLR0917 - a measurement and a reflector, number 
     surveyed_variance: float,
     model: ObservationModel,
     given: Considering | None,
-    work: FloatArray | None,
     width: int,
     at: int,
     center: float,
@@ -240,7 +238,7 @@ def correct_by_points(  # noqa: PLR0917 - a measurement and a reflector, number 
     aim : measured bearing as a direction, in base.
     reflector_x, reflector_y, surveyed_variance : the reflector's center [m], and variance of its place [m^2].
     model : of the observation.
-    given, work, width, at : as in `correct_aimed_with`, or None.
+    given, width, at : as in `correct_aimed_with`, or None.
     center : as in `fitted`.
 
     Notes
@@ -248,12 +246,12 @@ def correct_by_points(  # noqa: PLR0917 - a measurement and a reflector, number 
     x + K v, P - K S K^T with K = P_xz S^-1: Arasaratnam and Haykin 2009, Table I; here in Joseph's form of the line.
     """
     line = fitted(belief, facing, measured_range, aim, reflector_x, reflector_y, model, center)
-    v = fitted_innovation(belief, facing, measured_range, line, surveyed_variance, model, given, work, at)
+    v = fitted_innovation(belief, facing, measured_range, line, surveyed_variance, model, given, at)
     e, k = line.expected, gain(v)
-    if given is None or work is None:
+    if given is None:
         covariance = corrected_covariance(belief, e, k, v.range_noise, v.bearing_noise)
         covariance = with_cross_noise(covariance, k, line.rb)
     else:
-        d = seen_with(facing, e, surveyed_variance, given, work, at)
-        covariance = covariance_with(belief, e, k, v, d, line.rb, surveyed_variance, given, work, width, at)
+        d = seen_with(facing, e, surveyed_variance, given, at)
+        covariance = covariance_with(belief, e, k, v, d, line.rb, surveyed_variance, given, width, at)
     return moved_by(belief, facing, k, v, covariance)

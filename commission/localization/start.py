@@ -15,7 +15,7 @@ from scipy.spatial import KDTree
 from commission.compiled import compiled
 from commission.geometry.angles import wrap_scalar
 from commission.geometry.arrays import FloatArray, IntArray, read_only
-from commission.localization.reflector_index import Cells, nearest_entry
+from commission.localization.reflector_index import ReflectorIndex, nearest_entry
 
 CANDIDATES = 96
 """Poses that pairs suggest and that are judged: those that most things fit."""
@@ -73,9 +73,7 @@ def candidates(  # noqa: PLR0917 - things and the map, array by array
     pairs: IntArray,
     distances: FloatArray,
     ends: IntArray,
-    cells: Cells,
-    places: FloatArray,
-    cell_offsets: IntArray,
+    index: ReflectorIndex,
     found: FloatArray,
 ) -> int:
     """Poses of the frame of odometry that pairs of things suggest, those that fit most things; returns their number.
@@ -85,7 +83,7 @@ def candidates(  # noqa: PLR0917 - things and the map, array by array
     things : (C, 5) x, y [m] and covariance xx, xy, yy [m^2] in the frame of odometry.
     pairs : (P, 2) things to be looked up, the most telling first.
     distances, ends : see `DistanceTable`.
-    cells, places, cell_offsets : the map, see `ReflectorIndex`.
+    index : the map.
     found : (CANDIDATES, 4) out: x, y, heading of the frame in the map [m, m, rad], and how well it fits.
 
     Notes
@@ -96,7 +94,7 @@ def candidates(  # noqa: PLR0917 - things and the map, array by array
     count, tried = 0, 0
     scored = min(len(things), MOST_SCORED)
     reach = np.empty(scored)
-    survey = cells.largest_variance
+    places, survey = index.places, index.cells.largest_variance
     for pair in range(len(pairs)):
         i, j = pairs[pair, 0], pairs[pair, 1]
         dx, dy = things[j, 0] - things[i, 0], things[j, 1] - things[i, 1]
@@ -134,7 +132,7 @@ def candidates(  # noqa: PLR0917 - things and the map, array by array
                     fit += 1.0
                     continue
                 px, py = x + c * things[k, 0] - s * things[k, 1], y + s * things[k, 0] + c * things[k, 1]
-                best, square = nearest_entry(px, py, reach[k], cells, places, cell_offsets)
+                best, square = nearest_entry(px, py, reach[k], index)
                 if best >= 0:
                     fit += 1.0 - square / (reach[k] * reach[k])
             if fit > least:

@@ -12,20 +12,17 @@ from numpy.typing import NDArray
 
 from commission.compiled import compiled, compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray
-from commission.localization.consider_columns import carry_over
-from commission.localization.contour import ContourScan
-from commission.localization.cycle import Cycle, held_back, supervised, with_temporary
+from commission.localization.consider import ConstantsRoom, busy_of, cross_of
+from commission.localization.consider_columns import carry_to
+from commission.localization.cycle import Cycle, TemporaryLook, held_back, supervised, with_temporary
 from commission.localization.filter_kinds import is_invariant
-from commission.localization.observation import ObservationModel
 from commission.localization.odometry import NextOdometry, reach, velocity
-from commission.localization.rejection import weigh
+from commission.localization.rejection import NOTHING_COUNTED, weigh
 from commission.localization.rival_poses import RivalPoses
 from commission.localization.setup import FilterModel
 from commission.localization.several_scans import forget
 from commission.localization.state import FilterState
 from commission.localization.tags import ACCEPTED, REJECTED, USE, TagModel, correct_by_tag
-from commission.localization.temporary_memory import TemporaryMemory
-from commission.localization.temporary_model import TemporaryModel
 from commission.localization.zones import ZoneRows, kinds_at
 
 
@@ -44,26 +41,18 @@ class TagFrames(NamedTuple):
 
 
 @compiled
-def process_tags(  # noqa: PLR0917 - outputs are written into the arrays of the whole run
+def process_tags(  # noqa: PLR0917 - a frame and all that it is looked at with
     state: FilterState,
     stamp_ns: int,
+    following: NextOdometry,
     first: int,
     last: int,
     frames: TagFrames,
-    model: FilterModel,
-    observation: ObservationModel,
-    places: FloatArray,
-    cell_offsets: IntArray,
-    cross: FloatArray | None,
-    busy: IntArray | None,
-    status: NDArray[np.int8],
-    following: NextOdometry,
     figures: FloatArray,
+    model: FilterModel,
     zones: ZoneRows,
-    temporary: TemporaryModel | None,
-    memory: TemporaryMemory | None,
-    scan: ContourScan | None,
-    goods: FloatArray | None,
+    room: ConstantsRoom | None,
+    temporary: TemporaryLook | None,
     rivals: RivalPoses | None,
 ) -> Cycle:
     """Process the sightings of a frame.
@@ -72,16 +61,14 @@ def process_tags(  # noqa: PLR0917 - outputs are written into the arrays of the 
     ----------
     state : after everything before this frame.
     stamp_ns : of the frame [ns].
+    following : the odometry record at or after the frame, where it is known.
     first, last : rows of its sightings, the last one excluded.
     frames : sightings, and tags of the site.
-    model : of the whole filter.
-    observation, places, cell_offsets, status : of reflectors; nothing is read of them: a frame sees none.
-    cross : covariance of the pose with the constants, in and out, or None.
-    busy : see `busy_chunks`; None: as `cross`.
-    following : the odometry record at or after the frame, where it is known.
     figures : (n, COLUMNS) out, see `tags`.
+    model : of the whole filter.
     zones : where which kinds correct the pose.
-    temporary, memory, scan, goods : as in `process_scan`; the scan of a frame has no beams.
+    room : covariance of the pose with the considered constants, in and out; None: none is considered.
+    temporary : as in `process_scan`; the scan of a frame has no beams.
     rivals : where the vehicle may stand as well, in and out, or None; a tag that fits leaves none.
 
     Notes
@@ -89,10 +76,7 @@ def process_tags(  # noqa: PLR0917 - outputs are written into the arrays of the 
     No formula: `reach`, `correct_by_tag` each from the freshest state, and `supervised` in turn.
     """
     prior, motion = reach(state.belief, state.motion, stamp_ns, following, model.odometry)
-    if cross is not None and busy is not None:
-        moved = np.eye(3)
-        moved[0, 2], moved[1, 2] = -(prior.y - state.pivot[1]), prior.x - state.pivot[0]
-        carry_over(cross, moved, busy)
+    carry_to(room, prior, state.pivot)
     twist = velocity(state.motion, following)
     belief = prior
     for i in range(first, last if kinds_at(zones, prior.x, prior.y).tags else first):
@@ -103,31 +87,16 @@ def process_tags(  # noqa: PLR0917 - outputs are written into the arrays of the 
             frames.model,
             twist,
             model.consider,
-            cross,
-            busy,
+            cross_of(room),
+            busy_of(room),
             figures[i],
             is_invariant(model.gate.kind),
         )
-    belief = with_temporary(
-        prior, belief, temporary, memory, scan, state, motion, following, stamp_ns, model, cross, busy, goods
-    )
-    evidence = weigh(
-        state.evidence,
-        stamp_ns,
-        prior,
-        0,
-        0,
-        np.empty((0, 2)),
-        observation,
-        model.cells,
-        places,
-        cell_offsets,
-        status,
-        said_by_tags(figures, first, last),
-        model.rejection,
-    )
-    pivot = state.pivot if cross is None else (belief.x, belief.y)
-    if said_by_tags(figures, first, last) == 1.0:
+    belief = with_temporary(prior, belief, temporary, state, motion, following, stamp_ns, model, room)
+    said = said_by_tags(figures, first, last)
+    evidence = weigh(state.evidence, stamp_ns, prior, NOTHING_COUNTED, said, model.rejection)
+    pivot = state.pivot if room is None else (belief.x, belief.y)
+    if said == 1.0:
         forget(rivals)
     after = supervised(state, stamp_ns, belief, motion, evidence, pivot, state.walls, model)
     return Cycle(prior, held_back(rivals, state, after, model))

@@ -13,11 +13,11 @@ import numpy as np
 
 from commission.compiled import compiled, compiled_inline
 from commission.geometry.angles import TURN, wrap_scalar
-from commission.geometry.arrays import FloatArray, IntArray
+from commission.geometry.arrays import FloatArray
 from commission.localization.kalman import correct, innovation, squared_distance
 from commission.localization.observation import ObservationModel, expect, observation_at, scanner_offset
 from commission.localization.pose_gaussian import PoseGaussian, write_pose
-from commission.localization.reflector_index import Cells, cell_range
+from commission.localization.reflector_index import ReflectorIndex, cell_range
 from commission.localization.several_scans import carried
 from commission.localization.sightings import noise_on_floor
 
@@ -86,9 +86,7 @@ def follow(  # noqa: PLR0917 - a pose, the trail and the map
     eyes: FloatArray,
     longest: float,
     crowd: FloatArray,
-    cells: Cells,
-    places: FloatArray,
-    cell_offsets: IntArray,
+    index: ReflectorIndex,
     met: FloatArray,
 ) -> Explained:
     """Lead a pose along a trail, from its first scan to its last or the other way.
@@ -102,7 +100,7 @@ def follow(  # noqa: PLR0917 - a pose, the trail and the map
     eyes : see `SearchMap`.
     longest : range up to which anything is seen [m].
     crowd : (N,) one over the reflectors of the map that stand at the place of each, itself among them.
-    cells, places, cell_offsets : the map, see `ReflectorIndex`.
+    index : the map.
     met : (N, MET) out: how each reflector was met, see `trail_misfit`; (0, MET) where nobody asks.
 
     Notes
@@ -112,6 +110,7 @@ def follow(  # noqa: PLR0917 - a pose, the trail and the map
     counted by the way since the scan before. The pose is corrected by the mixture's mean and covariance (equations 40
     to 45 there). Evidence is the sum of ln L, that of each place bounded.
     """
+    places = index.places
     gains, most = np.zeros(len(places)), np.zeros(len(places))
     strange, strangers = np.empty((MOST_STRANGE, 3)), 0
     work = np.empty((RIVALS, 11))
@@ -136,9 +135,7 @@ def follow(  # noqa: PLR0917 - a pose, the trail and the map
                 trail.seen[i, 1],
                 model,
                 1.0 / max(counts, LEAST_COUNTED),
-                cells,
-                places,
-                cell_offsets,
+                index,
                 work,
             )
             ratio = 1.0 - OF_THE_MAP + odds * total
@@ -313,9 +310,7 @@ def _weigh(  # noqa: PLR0917 - a pose, a detection and the map
     bearing: float,
     model: ObservationModel,
     tempered: float,
-    cells: Cells,
-    places: FloatArray,
-    cell_offsets: IntArray,
+    index: ReflectorIndex,
     work: FloatArray,
 ) -> tuple[int, float]:
     """Write what the pose becomes by each reflector that a detection may be of, with its likelihood and row.
@@ -327,6 +322,7 @@ def _weigh(  # noqa: PLR0917 - a pose, a detection and the map
     ox, oy = scanner_offset(pose.theta, model)
     direction = pose.theta + model.mount_theta + bearing
     px, py = pose.x + ox + measured * math.cos(direction), pose.y + oy + measured * math.sin(direction)
+    cells, places, cell_offsets = index
     spread = max(pose.xx, pose.yy) + abs(pose.xy) + model.range_variance + cells.largest_variance
     spread += measured * measured * (pose.tt + model.bearing_variance)
     reach = min(math.sqrt(GATE * spread), FARTHEST)
@@ -401,9 +397,7 @@ def explain(  # noqa: PLR0917 - poses, the trail and the map
     eyes: FloatArray,
     longest: float,
     crowd: FloatArray,
-    cells: Cells,
-    places: FloatArray,
-    cell_offsets: IntArray,
+    index: ReflectorIndex,
     explained: FloatArray,
 ) -> None:
     """Say of each pose at the newest scan what it explains of a trail, and where it comes to stand by it.
@@ -411,7 +405,7 @@ def explain(  # noqa: PLR0917 - poses, the trail and the map
     Parameters
     ----------
     poses : (H, 3) of base at the newest scan [m, m, rad], map frame.
-    trail, models, eyes, longest, crowd, cells, places, cell_offsets : as in `follow`.
+    trail, models, eyes, longest, crowd, index : as in `follow`.
     explained : (H, 12) out: the pose (see `write_pose`), evidence, share and places as in `Explained`.
 
     Notes
@@ -423,8 +417,8 @@ def explain(  # noqa: PLR0917 - poses, the trail and the map
     volume = 1.5 * math.log(2.0 * math.pi) + math.log(BEGIN[0] ** 2 * BEGIN[1])
     for h in range(len(poses)):
         begin = PoseGaussian(poses[h, 0], poses[h, 1], poses[h, 2], position, 0.0, 0.0, position, 0.0, heading)
-        back = follow(begin, False, trail, models, eyes, longest, crowd, cells, places, cell_offsets, nobody).pose
+        back = follow(begin, False, trail, models, eyes, longest, crowd, index, nobody).pose
         begin = PoseGaussian(back.x, back.y, back.theta, position, 0.0, 0.0, position, 0.0, heading)
-        of_it = follow(begin, True, trail, models, eyes, longest, crowd, cells, places, cell_offsets, nobody)
+        of_it = follow(begin, True, trail, models, eyes, longest, crowd, index, nobody)
         write_pose(explained[h], of_it.pose)
         explained[h, 9], explained[h, 10], explained[h, 11] = of_it.evidence + volume, of_it.share, of_it.places

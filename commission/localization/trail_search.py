@@ -92,9 +92,7 @@ def explained_again(search: Search, belief: PoseGaussian | None, now_ns: int, ar
         pairs_of(things),
         table.distances,
         table.ends,
-        around.cells,
-        around.places,
-        around.offsets,
+        around.reflectors,
         found,
     )
     poses = [base_poses(search.explained, search.track), compose(found[: min(count, TRIED), :3], track)]
@@ -110,9 +108,7 @@ def explained_again(search: Search, belief: PoseGaussian | None, now_ns: int, ar
         around.eyes,
         max(float(search.trail.seen[:, 0].max()), 1.0),
         around.crowd,
-        around.cells,
-        around.places,
-        around.offsets,
+        around.reflectors,
         explained,
     )
     return replace(search, explained=read_only(_ranked(explained, search, belief, around)), way=0.0)

@@ -22,7 +22,7 @@ from commission.localization.consider import (
     innovation_given,
     scanner_jacobian,
 )
-from commission.localization.consider_columns import working_array
+from commission.localization.consider_columns import begin, room_for
 from commission.localization.consider_correction import correct_given
 from commission.localization.kalman import Gain, Innovation, corrected_covariance, gain, innovation
 from commission.localization.observation import Expected, ObservationModel, expect, observation_at, scanner_offset
@@ -142,18 +142,18 @@ def propagate_errors(  # noqa: PLR0917 - the columns of a drive
         belief, scanner, first, last = _at(x, y, theta, priors[k]), scanners[k], offsets[k], offsets[k + 1]
         observation, inliers[k] = observation_at(model.observations, scanner), 0.0
         offset_x, offset_y = scanner_offset(theta, observation)
-        twist = twist_of(step)
-        given = considering_at(cross, belief, pivot, twist, model.consider)
-        work = working_array(cross, given, count_of(cross, model.observations), scanner, last - first)
-        take_out_all(cross, given, work, blocks, indices, first, last)
-        kept = same_size(work)
+        twist, reflectors = twist_of(step), count_of(cross, model.observations)
+        given = considering_at(room_for(cross, last - first), belief, pivot, twist, model.consider)
+        begin(given, reflectors, scanner)
+        take_out_all(given, blocks, indices, first, last)
+        kept = same_size(given)
         for i in range(first, last):
             m, at = indices[i], BLOCKS + PER_REFLECTOR * (i - first)
             mount = observation.mount_theta
             e = expect(x, y, theta, offset_x, offset_y, places[m, 0], places[m, 1], mount)
             true = worth(model.noise, int(kinds[scanner, m]), e.range)
-            says = innovation_given(belief, e, e.range, e.bearing, places[m, 2], observation, given, work, at)
-            passing = _passing(belief, e, says, true, places[m, 2], observation, model.gate_d2, given, work, at)
+            says = innovation_given(belief, e, e.range, e.bearing, places[m, 2], observation, given, at)
+            passing = _passing(belief, e, says, true, places[m, 2], observation, model.gate_d2, given, at)
             seen = true.probability * model.free_per_m**e.range
             error = _after(error, e, gain(says), true, passing, seen, observation)
             row = scanner * len(places) + m
@@ -167,14 +167,14 @@ def propagate_errors(  # noqa: PLR0917 - the columns of a drive
             _disturb(responses, row, m, bias, e, gain(says), share, true, model.beams[scanner])
             j = scanner_jacobian(direction_of(theta), e, twist[0], twist[1], twist[2])
             _disturb_all(askew[scanner], j, gain(says), share)
-            remember(work, kept)
+            remember(given, kept)
             probability = seen * model.inside_gate
             corrected = correct_given(
-                belief, e.range, e.bearing, places[m, 0], places[m, 1], places[m, 2], observation, given, work, at
+                belief, e.range, e.bearing, places[m, 0], places[m, 1], places[m, 2], observation, given, at
             )
             belief = mixed(belief, corrected, probability)
-            mix(work, kept, probability)
-        put_all_back(cross, work, blocks, indices, first, last, count_of(cross, model.observations), scanner)
+            mix(given, kept, probability)
+        put_all_back(given, blocks, indices, first, last, reflectors, scanner)
         count = _forget(responses, followed, is_followed, count)
         _gather(error, responses, followed[:count], places, bias, squares[k], parts[k])
         _gather_scanners(askew, model.consider, squares[k], parts[k])
@@ -207,7 +207,6 @@ def _passing(  # noqa: PLR0917 - a detection, number by number
     o: ObservationModel,
     gate_d2: float,
     given: Considering | None,
-    work: FloatArray | None,
     at: int,
 ) -> _Passing:
     """What the gate g does when the filter says S of innovations whose covariance is T.
@@ -217,7 +216,7 @@ def _passing(  # noqa: PLR0917 - a detection, number by number
     that are rejected would widen it until all drives seemed to be.
     """
     actual = ObservationModel(o.mount_x, o.mount_y, o.mount_theta, true.range_variance, true.bearing_variance, 0.0)
-    is_so = innovation_given(belief, e, e.range, e.bearing, surveyed, actual, given, work, at)
+    is_so = innovation_given(belief, e, e.range, e.bearing, surveyed, actual, given, at)
     across = is_so.w - says.w
     trace = is_so.s_rr / says.s_rr + (is_so.schur + across * across * is_so.s_rr) / says.schur
     u = gate_d2 / trace

@@ -20,7 +20,7 @@ from commission.localization.consider import (
     considering_at,
     innovation_given,
 )
-from commission.localization.consider_columns import put_back, put_block, take_out, working_array
+from commission.localization.consider_columns import begin, put_back, put_block, room_for, take_out
 from commission.localization.consider_correction import correct_given
 from commission.localization.kalman import Innovation, squared_distance
 from commission.localization.observation import ObservationModel, expect, observation_at, scanner_offset
@@ -116,17 +116,18 @@ def predict_covariances(  # noqa: PLR0917 - the columns of a drive
             offsets[k + 1],
         )
         offset_x, offset_y = scanner_offset(theta, observation)
-        given = considering_at(cross, prior, pivot, twist_of(step), model.consider)
-        work = working_array(cross, given, count_of(cross, model.observations), scanners[k], last - first)
-        take_out_all(cross, given, work, blocks, indices, first, last)
-        kept = same_size(work)
+        reflectors = count_of(cross, model.observations)
+        given = considering_at(room_for(cross, last - first), prior, pivot, twist_of(step), model.consider)
+        begin(given, reflectors, scanners[k])
+        take_out_all(given, blocks, indices, first, last)
+        kept = same_size(given)
         passes, found = np.empty(last - first, np.bool_), 0
         for i in range(first, last):
             m = indices[i]
             target_x, target_y = places[m, 0] + shifts[m, 0], places[m, 1] + shifts[m, 1]
             truth = expect(x, y, theta, offset_x, offset_y, target_x, target_y, observation.mount_theta)
             at = BLOCKS + PER_REFLECTOR * (i - first)
-            v = _expected_innovation(prior, truth.range, truth.bearing, places, m, observation, given, work, at)
+            v = _expected_innovation(prior, truth.range, truth.bearing, places, m, observation, given, at)
             passes[i - first] = truth.range <= reach[m] and squared_distance(v) <= model.gate_d2
             innovations[i, 0], innovations[i, 1], innovations[i, 2] = v.s_rr, v.w, v.schur
         for i in range(first, last):
@@ -135,7 +136,7 @@ def predict_covariances(  # noqa: PLR0917 - the columns of a drive
             m = indices[i]
             target_x, target_y = places[m, 0] + shifts[m, 0], places[m, 1] + shifts[m, 1]
             truth = expect(x, y, theta, offset_x, offset_y, target_x, target_y, observation.mount_theta)
-            remember(work, kept)
+            remember(given, kept)
             corrected = correct_given(
                 belief,
                 truth.range,
@@ -145,15 +146,14 @@ def predict_covariances(  # noqa: PLR0917 - the columns of a drive
                 places[m, 2],
                 observation,
                 given,
-                work,
                 BLOCKS + PER_REFLECTOR * (i - first),
             )
             detected = worth(model.noise, int(model.kinds[scanners[k], m]), truth.range).probability
             found += detected >= LIKELY
             probability = detected * model.inside_gate * model.free_per_m**truth.range
             belief = mixed(belief, corrected, probability)
-            mix(work, kept, probability)
-        put_all_back(cross, work, blocks, indices, first, last, count_of(cross, model.observations), scanners[k])
+            mix(given, kept, probability)
+        put_all_back(given, blocks, indices, first, last, reflectors, scanners[k])
         pivot = (belief.x, belief.y)
         mode = supervise(mode, belief, model.limits)
         if found > 0:
@@ -211,21 +211,13 @@ def count_of(cross: FloatArray | None, observations: FloatArray) -> int:
 
 
 @compiled_inline
-def take_out_all(  # noqa: PLR0917 - the columns of a drive
-    cross: FloatArray | None,
-    given: Considering | None,
-    work: FloatArray | None,
-    blocks: IntArray,
-    indices: IntArray,
-    first: int,
-    last: int,
-) -> None:
+def take_out_all(given: Considering | None, blocks: IntArray, indices: IntArray, first: int, last: int) -> None:
     """Write the columns of all visible reflectors of a scan.
 
     Parameters
     ----------
-    cross, given, work : as in `consider.take_out`, or None.
-    blocks : (M,) columns of each reflector in `cross`.
+    given : of the scan, or None.
+    blocks : (M,) columns that each reflector has in the covariance with the constants.
     indices : visible reflectors of all scans.
     first, last : those of this one, the last one excluded.
 
@@ -233,16 +225,15 @@ def take_out_all(  # noqa: PLR0917 - the columns of a drive
     -----
     No formula: `take_out` of each.
     """
-    if cross is None or given is None or work is None:
+    if given is None:
         return
     for i in range(first, last):
-        take_out(work, BLOCKS + PER_REFLECTOR * (i - first), cross, int(blocks[indices[i]]), given)
+        take_out(given, BLOCKS + PER_REFLECTOR * (i - first), int(blocks[indices[i]]))
 
 
 @compiled_inline
 def put_all_back(  # noqa: PLR0917 - the columns of a drive
-    cross: FloatArray | None,
-    work: FloatArray | None,
+    given: Considering | None,
     blocks: IntArray,
     indices: IntArray,
     first: int,
@@ -254,57 +245,57 @@ def put_all_back(  # noqa: PLR0917 - the columns of a drive
 
     Parameters
     ----------
-    cross, work : as in `consider.put_back`, or None.
-    blocks, indices, first, last : as in `take_out_all`.
-    reflectors : that `cross` has columns for.
+    given, blocks, indices, first, last : as in `take_out_all`.
+    reflectors : that the covariance with the constants has columns for.
     scanner : index of the scanner.
 
     Notes
     -----
     No formula: `put_back`, and `put_block` of each.
     """
-    if cross is None or work is None:
+    if given is None:
         return
-    put_back(cross, work, reflectors, scanner, None)
+    put_back(given, reflectors, scanner)
     for i in range(first, last):
-        put_block(cross, work, BLOCKS + PER_REFLECTOR * (i - first), int(blocks[indices[i]]), None)
+        put_block(given, BLOCKS + PER_REFLECTOR * (i - first), int(blocks[indices[i]]))
 
 
 @compiled_inline
-def same_size(work: FloatArray | None) -> FloatArray | None:
-    """Array of the same size, or None.
+def same_size(given: Considering | None) -> FloatArray | None:
+    """Array of the size of a scan's working array, or None.
 
     Notes
     -----
     shape = (3, columns), by definition.
     """
-    if work is None:
+    if given is None:
         return None
-    return np.empty((3, work.shape[1]))
+    return np.empty((3, given.room.work.shape[1]))
 
 
 @compiled_inline
-def remember(work: FloatArray | None, kept: FloatArray | None) -> None:
-    """Copy a working array.
+def remember(given: Considering | None, kept: FloatArray | None) -> None:
+    """Copy a scan's working array.
 
     Notes
     -----
     kept = work, by definition.
     """
-    if work is None or kept is None:
+    if given is None or kept is None:
         return
+    work = given.room.work
     for row in range(3):
         for j in range(work.shape[1]):
             kept[row, j] = work[row, j]
 
 
 @compiled_inline
-def mix(work: FloatArray | None, kept: FloatArray | None, probability: float) -> None:
+def mix(given: Considering | None, kept: FloatArray | None, probability: float) -> None:
     """Mean of the covariance with the constants with a detection and without it, as `mixed`.
 
     Parameters
     ----------
-    work : with the detection; in place.
+    given : of the scan, whose working array is with the detection; in place.
     kept : without it.
     probability : that there is one [0..1].
 
@@ -312,8 +303,9 @@ def mix(work: FloatArray | None, kept: FloatArray | None, probability: float) ->
     -----
     C = p C_after + (1 - p) C_before: Sinopoli et al. 2004, of the whole covariance.
     """
-    if work is None or kept is None:
+    if given is None or kept is None:
         return
+    work = given.room.work
     for row in range(3):
         for j in range(work.shape[1]):
             work[row, j] = probability * work[row, j] + (1.0 - probability) * kept[row, j]
@@ -372,14 +364,13 @@ def _expected_innovation(  # noqa: PLR0917 - a measurement, number by number
     m: int,
     observation: ObservationModel,
     given: Considering | None,
-    work: FloatArray | None,
     at: int,
 ) -> Innovation:
     """Innovation of the expected detection at the predicted belief, constants considered."""
     offset_x, offset_y = scanner_offset(prior.theta, observation)
     mount = observation.mount_theta
     expected = expect(prior.x, prior.y, prior.theta, offset_x, offset_y, places[m, 0], places[m, 1], mount)
-    return innovation_given(prior, expected, distance, bearing, places[m, 2], observation, given, work, at)
+    return innovation_given(prior, expected, distance, bearing, places[m, 2], observation, given, at)
 
 
 @compiled_inline

@@ -17,18 +17,18 @@ from commission.localization.association import (
     gate_of,
     likeliest,
 )
-from commission.localization.consider import Considering, ConsiderModel, innovation_with, seen_with
+from commission.localization.consider import Considering, ConsiderModel, ConstantsRoom, innovation_with, seen_with
 from commission.localization.estimate import Status
 from commission.localization.kalman import correct
 from commission.localization.observation import ObservationModel, expect
 from commission.localization.pose_gaussian import PoseGaussian, covariance_of, mean_of
 from commission.localization.reflector_index import ReflectorIndex, build_index
+from commission.localization.scan_rows import ScanRows
 from commission.localization.search import Viewpoint, search_radius2, viewpoint, widened
 from commission.site.parameters import AssociationParameters
 from commission.site.reflectors import Reflector, ReflectorMap
 from tests.localization.plain_observation import innovation_covariances, innovations, log_likelihoods, matrix
 
-NOTHING_CONSIDERED = (None, None, None)
 SEEDS = st.integers(0, 2**32 - 1)
 
 
@@ -92,10 +92,8 @@ def test_nearby_search_equals_a_plain_search_over_all_reflectors(seed: int, enab
             view,
             model,
             gate,
-            index.cells,
-            index.places,
-            index.offsets,
-            *NOTHING_CONSIDERED,
+            index,
+            None,
         )
         scored = over_all(belief, z, model, index)
         if not scored:
@@ -173,15 +171,16 @@ def test_bounds_that_hold_the_constants_hold_any_correlation_of_theirs_with_the_
     model = random_model(rng)
     bias, clock = np.exp(rng.uniform(-8.0, -3.0, 2))
     speed = rng.uniform(-1.0, 1.0, 3)
-    given = Considering(ConsiderModel(joint[5, 5], joint[7, 7], bias**2, clock**2), 0.0, 0.0, *speed)
+    work = np.zeros((3, 10))
+    work[:, 8:10], work[:, 3:6] = joint[:3, 3:5], joint[:3, 5:8]
+    known, room = ConsiderModel(joint[5, 5], joint[7, 7], bias**2, clock**2), ConstantsRoom(work[:, :0], work, None)
+    given = Considering(known, 0.0, 0.0, *speed, room)
     facing = direction_of(belief.theta)
     view = viewpoint(belief, facing, model)
     wide = widened(view, joint[3, 3], given)
     place = np.array([belief.x, belief.y]) + rng.uniform(-9, 9, 2)
     e = expect(belief.x, belief.y, belief.theta, view.offset_x, view.offset_y, *place, model.mount_theta)
-    work = np.zeros((3, 10))
-    work[:, 8:10], work[:, 3:6] = joint[:3, 3:5], joint[:3, 5:8]
-    seen = seen_with(facing, e, joint[3, 3], given, work, 8)
+    seen = seen_with(facing, e, joint[3, 3], given, 8)
     v = innovation_with(belief, e, e.range, 0.0, model, seen)
     assert v.s_rr <= wide.position_sigma**2 + model.range_variance * (1.0 + 1e-9)
     bearing = (wide.position_sigma / e.range + wide.heading_sigma) ** 2 + model.bearing_variance
@@ -215,11 +214,10 @@ def associated(
     count = len(detections)
     status, entries, d2 = np.zeros(count, np.int8), np.empty(count, np.int64), np.empty(count)
     gate = Gate(enabled, 5.991)
-    the_map = (index.cells, index.places, index.offsets)
     facing = direction_of(belief.theta)
     aims = np.array([(math.cos(bearing), math.sin(bearing), 0.0) for _, bearing in detections])
-    scan = (0, count, detections, aims)
-    associate(belief, facing, *scan, model, gate, *the_map, *NOTHING_CONSIDERED, status, entries, d2)
+    rows = ScanRows(0, count, detections, aims, status, entries, d2)
+    associate(belief, facing, rows, model, gate, index, None)
     return status.tolist(), entries.tolist(), d2.tolist()
 
 

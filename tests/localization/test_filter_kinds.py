@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from commission.geometry import se2
 from commission.geometry.directions import direction_of
-from commission.localization.consider import BLOCKS, Considering, ConsiderModel
+from commission.localization.consider import BLOCKS, Considering, ConsiderModel, ConstantsRoom
 from commission.localization.filter_kinds import FILTER_KINDS, correct_by, filter_kind
 from commission.localization.localizer import Localizer
 from commission.localization.observation import ObservationModel
@@ -38,7 +38,10 @@ def belief_of(mean: Array, cov: Array) -> PoseGaussian:
     return PoseGaussian(*(float(each) for each in numbers))
 
 
-def corrected(kind: str, belief: PoseGaussian, z: Array, place: Array, constants=(None, None, 0, 0)):
+KNOWN = ConsiderModel(4e-6, 1e-6, 9e-6, 1e-4)
+
+
+def corrected(kind: str, belief: PoseGaussian, z: Array, place: Array, constants=(None, 0, 0)):
     aim = direction_of(MODEL.mount_theta + float(z[1]))
     where = (float(place[0]), float(place[1]), 0.0)
     number = filter_kind(FilterParameters(kind=kind))
@@ -97,14 +100,15 @@ def test_considered_constants_correct_like_schmidts_filter_of_the_whole_state(ki
         mean, place = rng.uniform([-5, -5, -3], [5, 5, 3]), rng.uniform(8.0, 15.0, 2)
         root = rng.normal(size=(3, 3)) * [[1e-3], [1e-3], [1e-4]]
         cov = root @ root.T
-        work = [[3e-7], [3e-7], [3e-8]] * rng.normal(size=(3, BLOCKS + 2))
-        known = ConsiderModel(4e-6, 1e-6, 9e-6, 1e-4)
-        considering = Considering(known, 0.0, 0.0, 0.4, 0.1, 0.2)
+        numbers = [[3e-7], [3e-7], [3e-8]] * rng.normal(size=(3, BLOCKS + 2))
+        reference = numbers.copy()
+        own, papers = (
+            Considering(KNOWN, 0.0, 0.0, 0.4, 0.1, 0.2, ConstantsRoom(np.empty((3, 0)), work, None))
+            for work in (numbers, reference)
+        )
         z = observed(mean, MOUNTING, place[np.newaxis])[0] + 1e-4 * rng.normal(size=2)
-        numbers = work.copy()
-        after = corrected(kind, belief_of(mean, cov), z, place, (considering, numbers, BLOCKS + 2, BLOCKS))
-        reference = work.copy()
-        paper = corrected("ekf", belief_of(mean, cov), z, place, (considering, reference, BLOCKS + 2, BLOCKS))
+        after = corrected(kind, belief_of(mean, cov), z, place, (own, BLOCKS + 2, BLOCKS))
+        paper = corrected("ekf", belief_of(mean, cov), z, place, (papers, BLOCKS + 2, BLOCKS))
         assert mean_of(after) == pytest.approx(mean_of(paper), abs=2e-6)
         sigmas = np.sqrt(np.diag(cov))
         off = (covariance_of(after) - covariance_of(paper)) / np.outer(sigmas, sigmas)

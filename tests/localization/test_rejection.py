@@ -19,12 +19,14 @@ from commission.localization.rejection import (
     NO_EVIDENCE,
     Evidence,
     RejectionRule,
+    count_detections,
     is_harmless,
     nearest,
     rejection_rule,
     rejects_the_world,
     weigh,
 )
+from commission.localization.scan_rows import ScanRows
 from commission.localization.setup import LocalizerSetup
 from commission.localization.whole_run import run
 from commission.site.parameters import Parameters, SupervisorParameters
@@ -201,9 +203,16 @@ def rejected(setup: LocalizerSetup, detections: FloatArray) -> Evidence:
     """What a scan leaves all of whose detections are rejected, of a vehicle at the origin."""
     status = np.full(len(detections), int(Status.OUTLIER_ASSOCIATION), dtype=np.int8)
     belief = PoseGaussian(0.0, 0.0, 0.0, 1e-6, 0.0, 0.0, 1e-6, 0.0, 1e-6)
-    rows, index = (0, len(detections)), setup.index
-    map_rows, rule = (index.cells, index.places, index.offsets), rejection_rule(SupervisorParameters())
-    return weigh(NO_EVIDENCE, SECOND, belief, *rows, detections, setup.observations[0], *map_rows, status, 0.0, rule)
+    rule = rejection_rule(SupervisorParameters())
+    counted = count_detections(belief, rows_of(detections, status), setup.observations[0], setup.index, rule)
+    return weigh(NO_EVIDENCE, SECOND, belief, counted, 0.0, rule)
+
+
+def rows_of(detections: FloatArray, status: np.ndarray) -> ScanRows:
+    """A scan whose detections have been associated."""
+    number = len(detections)
+    aims, entries, d2 = np.empty((number, 3)), np.full(number, -1), np.full(number, np.nan)
+    return ScanRows(0, number, detections, aims, status, entries, d2)
 
 
 def weighed(
@@ -221,21 +230,9 @@ def weighed(
     )
     status = np.array([0] * accepted + [2] * rejected, dtype=np.int8)
     belief = PoseGaussian(0.0, 0.0, 0.0, variance, 0.0, 0.0, variance, 0.0, 1e-6)
-    return weigh(
-        NO_EVIDENCE._replace(against=against, confirmed=0.0),
-        SECOND,
-        belief,
-        0,
-        len(status),
-        np.tile(place, (len(status), 1)),
-        setup.observations[0],
-        setup.index.cells,
-        setup.index.places,
-        setup.index.offsets,
-        status,
-        contours,
-        RULE._replace(doubtful_position=1.0),
-    )
+    rows, rule = rows_of(np.tile(place, (len(status), 1)), status), RULE._replace(doubtful_position=1.0)
+    counted = count_detections(belief, rows, setup.observations[0], setup.index, rule)
+    return weigh(NO_EVIDENCE._replace(against=against, confirmed=0.0), SECOND, belief, counted, contours, rule)
 
 
 def lonely(**supervisor: Any) -> Localizer:
@@ -396,11 +393,11 @@ def test_the_nearest_reflector_is_that_of_brute_force_and_none_beyond_reach() ->
         away = min(math.dist((x, y), center) for center in reflectors.centers)
         # Distances of brute force are rounded otherwise in the last bits.
         for reach, found in ((away * (1.0 + 1e-14), away), (away * (1.0 - 1e-14), math.inf), (away + 1.0, away)):
-            _, got = nearest(x, y, reach, index.cells, index.places, index.offsets)
+            _, got = nearest(x, y, reach, index)
             assert got == pytest.approx(found, rel=1e-14)
 
 
 def test_a_reflector_exactly_at_reach_is_near() -> None:
     index = build_index(ReflectorMap((Reflector(id="A", x=3.0, y=4.0),)))
     for reach, found in ((5.0, 5.0), (math.nextafter(5.0, 0.0), math.inf)):
-        assert nearest(0.0, 0.0, reach, index.cells, index.places, index.offsets)[1] == found
+        assert nearest(0.0, 0.0, reach, index)[1] == found

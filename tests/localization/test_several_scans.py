@@ -19,6 +19,7 @@ from commission.localization.observation import ObservationModel
 from commission.localization.pose_gaussian import PoseGaussian, covariance_of, mean_of
 from commission.localization.reflector_index import build_index
 from commission.localization.rival_poses import poses_of
+from commission.localization.scan_rows import ScanRows
 from commission.localization.setup import LocalizerSetup
 from commission.localization.several_scans import (
     SEEN_PER_FALSE,
@@ -72,10 +73,9 @@ class Tracked:
         chosen = np.full(count, -1)
         aims = np.column_stack((np.cos(0.2 + scan[:, 1]), np.sin(0.2 + scan[:, 1]), np.zeros(count)))
         assert self.poses is not None
-        decision = decide_over_scans(
-            self.poses, prior, 0, count, scan, aims, np.zeros(count, np.int8), MODEL, GATE, index.cells, index.places,
-            index.offsets, None, chosen,
-        )  # fmt: skip
+        nothing = np.zeros(count, np.int8), np.full(count, -1), np.full(count, np.nan)
+        rows = ScanRows(0, count, scan, aims, *nothing)
+        decision = decide_over_scans(self.poses, prior, rows, MODEL, GATE, index, None, chosen)
         own = decision.prior
         for z, entry in zip(scan.tolist(), chosen.tolist(), strict=True):
             if entry >= 0:

@@ -65,9 +65,7 @@ def found_in(reflectors: ReflectorMap, things: np.ndarray) -> np.ndarray:
     index, found = build_index(reflectors), np.empty((CANDIDATES, 4))
     table = pair_table(index.places, 40.0)
     pairs = read_only(np.array(list(itertools.combinations(range(len(things)), 2)), dtype=np.int64))
-    count = candidates(
-        things_at(things), pairs, table.distances, table.ends, index.cells, index.places, index.offsets, found
-    )
+    count = candidates(things_at(things), pairs, table.distances, table.ends, index, found)
     return found[:count]
 
 
@@ -139,9 +137,7 @@ def judged(
             walls is not None,
             read_only(every if facings is None else facings),
         ),
-        index.cells,
-        index.places,
-        index.offsets,
+        index,
         row,
     )
     return row[0]

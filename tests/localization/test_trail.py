@@ -131,9 +131,7 @@ def test_a_pose_is_led_along_as_a_plain_filter_with_matrices_leads_it(forth: boo
         around.eyes,
         8.0,
         around.crowd,
-        around.cells,
-        around.places,
-        around.offsets,
+        around.reflectors,
         np.zeros((0, MET)),
     )
     plain = PlainPose(begin, p, setup, 8.0)

@@ -102,7 +102,7 @@ LOCALIZATION = (
     Mutant(
         name="filters of the protection level outlive that the vehicle is lost",
         file=FOLDER + "protected_cycle.py",
-        find="        forget(bank)\n",
+        find="        forget(protected.bank)\n",
         replace="",
         tests=(PROTECTION + "test_live_is_the_whole_run_to_the_last_bit",),
     ),
@@ -245,8 +245,8 @@ LOCALIZATION = (
     Mutant(
         name="range bias added instead of taken off before association",
         file=FOLDER + "association.py",
-        find="detections[i, 0] - model.range_bias",
-        replace="detections[i, 0] + model.range_bias",
+        find="measured[i, 0] - model.range_bias",
+        replace="measured[i, 0] + model.range_bias",
         tests=(PLAIN,),
     ),
     Mutant(
@@ -444,8 +444,8 @@ LOCALIZATION = (
     Mutant(
         name="reflector handed out by its row in the cells instead of in the map",
         file=FOLDER + "cycle.py",
-        find="reflectors[i] = int(places[reflectors[i], 3])",
-        replace="reflectors[i] = int(reflectors[i])",
+        find="rows.entries[i] = int(index.places[rows.entries[i], 3])",
+        replace="rows.entries[i] = int(rows.entries[i])",
         tests=(PLAIN,),
     ),
     Mutant(
@@ -489,8 +489,8 @@ LOCALIZATION = (
     Mutant(
         name="each rejected detection is excused alone, whatever several tell together",
         file=FOLDER + "rejection.py",
-        find="rejected, near = rejected + told, near + told",
-        replace="rejected, near = rejected, near",
+        find="return Counted(accepted, rejected + told, near + told)",
+        replace="return Counted(accepted, rejected, near)",
         tests=(TESTS + "test_rejection.py::test_several_that_tell_of_one_displacement_count_though_each_is_harmless",),
     ),
     Mutant(
