@@ -17,6 +17,7 @@ from commission.localization.localizer import Localizer
 from commission.localization.observation import ObservationModel
 from commission.localization.pose_gaussian import PoseGaussian, covariance_of, mean_of
 from commission.localization.reflector_index import ReflectorIndex, build_index
+from commission.localization.scan_rows import ScanRows
 from commission.localization.whole_run import run
 from commission.site.parameters import (
     ASSOCIATION_METHODS,
@@ -50,11 +51,10 @@ def associated(
     parameters = AssociationParameters(method=method, gate_probability=0.99)
     status, entries, d2 = np.zeros(count, np.int8), np.empty(count, np.int64), np.empty(count)
     aims = np.array([(*direction_of(MODEL.mount_theta + float(bearing)), 0.0) for _, bearing in detections])
-    the_map = (index.cells, index.places, index.offsets)
-    scan = (0, count, detections, aims.reshape(count, 3))
+    rows = ScanRows(0, count, detections, aims.reshape(count, 3), status, entries, d2)
     gate = gate_of(parameters, kind)
     facing = direction_of(belief.theta)
-    associate(belief, facing, *scan, MODEL, gate, *the_map, None, None, None, status, entries, d2)
+    associate(belief, facing, rows, MODEL, gate, index, None)
     named = [
         int(index.places[e, 3]) if e != NOBODY and s == Status.INLIER else -1
         for e, s in zip(entries, status, strict=True)
