@@ -22,6 +22,7 @@ from commission.geometry.arrays import FloatArray, Growing, IntArray
 from commission.io.atomic import cannot_write
 from commission.io.recordings import motion
 from commission.io.recordings.scan_archive import ScanArchive
+from commission.io.recordings.scan_file import load_scans
 from commission.io.recordings.scan_writer import ScanWriter
 from commission.site.record_log import RecordLog
 from commission.site.record_store import ScanStore
@@ -219,7 +220,7 @@ class Collector:
         for index, queue in enumerate(self._queues):
             try:
                 if queue.finish():
-                    store = ScanArchive(queue.file).load(index)
+                    store = load_scans(ScanArchive(queue.file), index)
                     found.extend([] if store is None else [store])
             except FileFormatError as error:
                 where = f"scans of {self.scanners[index]}"

@@ -23,6 +23,7 @@ from commission.io.recordings import motion
 from commission.io.recordings.bearing_file import BEARINGS, read_reflexes
 from commission.io.recordings.reference_file import REFERENCE_MOUNT, read_reference_mount
 from commission.io.recordings.scan_archive import ScanArchive
+from commission.io.recordings.scan_file import load_scans
 from commission.io.recordings.tag_file import TAGS, read_tags
 from commission.io.recordings.truth_file import TRUTH, read_truth
 from commission.site.record_log import RecordLog
@@ -102,7 +103,7 @@ class CsvFolder:
         return tuple(names) or (ONLY_NAME,)
 
     def _loaded_scans(self) -> tuple[ScanStore, ...]:
-        found = (archive.load(index) for index, archive in enumerate(self._archives))
+        found = (load_scans(archive, index) for index, archive in enumerate(self._archives))
         return tuple(scans for scans in found if scans is not None)
 
     @staticmethod

@@ -45,7 +45,7 @@ from commission.io.recordings.recorder import (
     scanner_topics,
 )
 from commission.io.recordings.reference_file import reference_mount_of
-from commission.io.recordings.scan_archive import IN_MEMORY
+from commission.io.recordings.scan_file import IN_MEMORY
 from commission.io.recordings.truth_file import truth_of
 from commission.io.recordings.whole import WholeRecording
 from commission.site.bearing_log import BearingLog

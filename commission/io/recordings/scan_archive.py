@@ -6,7 +6,9 @@
 from __future__ import annotations
 
 import math
+import shutil
 import struct
+import tempfile
 import zipfile
 import zlib
 from collections.abc import Generator, Iterator
@@ -20,16 +22,13 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from commission.errors import FileFormatError
-from commission.geometry.arrays import FloatArray, Growing, IntArray
+from commission.geometry.arrays import FloatArray, IntArray
 from commission.io.reading import cannot_read, check_size
-from commission.io.recordings.scan_file import ScanFile, array_place, joined_scans, ordered_rows
 from commission.site.quantity import STAMP_LIMIT
-from commission.site.record_store import ScanLog, ScanStore, everywhere
+from commission.site.record_store import ScanLog, everywhere
 
 BEAM_LIMIT = 100_000
 """Beams in one scan."""
-IN_MEMORY = 64_000_000
-"""Bytes of scans that `load` keeps in memory; those of a larger recording stay in the file."""
 BOMB_SIZE = 256_000_000
 """Unpacked bytes from which an archive is suspected: no harm is done by less."""
 BOMB_RATIO = 200
@@ -38,8 +37,9 @@ nothing, 1,000 beams of which 20 came back, reach 40."""
 _SMALL_LIMIT = 50_000_000
 """Scans of a recording: 23 days at 25 a second; their stamps and angles are in memory."""
 _FILE_LIMIT = 1_000_000_000_000
-_BYTES_AT_ONCE = 4_000_000
-_ROWS = ("ranges", "intensities", "reflector")
+BYTES_AT_ONCE = 4_000_000
+"""What is read and unpacked at a time."""
+ROWS = ("ranges", "intensities", "reflector")
 """Arrays with a row for each scan and a number for each beam."""
 _ANGLES = ("angle_min", "angle_increment")
 _GARBAGE = (zipfile.BadZipFile, zlib.error, EOFError, ValueError, struct.error, NotImplementedError, RuntimeError)
@@ -82,12 +82,12 @@ class ScanArchive:
         """
         check_size(path, _FILE_LIMIT)
         self.path = path
-        with self._open() as archive:
+        with self.open() as archive:
             members = set(archive.namelist())
             self._refuse_bomb(archive)
             self.columns = {
                 name: self._header(archive, name)
-                for name in ("stamp_ns", *_ROWS, *_ANGLES, "beams")
+                for name in ("stamp_ns", *ROWS, *_ANGLES, "beams")
                 if f"{name}.npy" in members
             }
             self._check_columns()
@@ -100,7 +100,7 @@ class ScanArchive:
                 self.columns |= {
                     name: replace(column, shape=(len(self._order), *column.shape[1:]))
                     for name, column in self.columns.items()
-                    if name in {"stamp_ns", *_ROWS}
+                    if name in {"stamp_ns", *ROWS}
                 }
         if (self.angle_increment == 0.0).any():
             raise self._error("angle_increment", "is 0", "the step from beam to beam [rad]")
@@ -117,9 +117,9 @@ class ScanArchive:
         FileFormatError
             the archive ends early, or a range is negative.
         """
-        names = [name for name in ("stamp_ns", *_ROWS) if name in self.columns]
-        rows_at_once = max(1, _BYTES_AT_ONCE // sum(self.columns[name].row_bytes for name in names))
-        with self._open() as archive, ExitStack() as stack:
+        names = [name for name in ("stamp_ns", *ROWS) if name in self.columns]
+        rows_at_once = max(1, BYTES_AT_ONCE // sum(self.columns[name].row_bytes for name in names))
+        with self.open() as archive, ExitStack() as stack:
             files = {name: stack.enter_context(self.rows_of(archive, name)) for name in names}
             for start in range(0, len(self), rows_at_once):
                 count = min(rows_at_once, len(self) - start)
@@ -127,37 +127,6 @@ class ScanArchive:
                 part = slice(start, start + count)
                 arrays |= {"angle_min": self.angle_min[part], "angle_increment": self.angle_increment[part]}
                 yield self.scan_log(arrays | {"beams": self.beams[part]}, start)
-
-    def load(self, scanner: int = 0) -> ScanStore | None:
-        """Check all scans, and keep them in memory or in the file, by their size; None when there are none.
-
-        Parameters
-        ----------
-        scanner : which scanner they are of: index into the names that the log has.
-
-        Raises
-        ------
-        FileFormatError
-            as `blocks`, or what is compressed finds no room on the disk.
-        """
-        if len(self) == 0:
-            return None
-        if sum(len(self) * column.row_bytes for column in self.columns.values()) <= IN_MEMORY:
-            return replace(joined_scans(list(self.blocks())), scanner=scanner)
-        stamps = Growing(np.int64)
-        for block in self.blocks():
-            stamps.append(block.stamps_ns)
-        with self._open() as archive:
-            places = {name: array_place(self, archive, name) for name in _ROWS if name in self.columns}
-        return ScanFile(
-            archive=self,
-            places=places,
-            stamps_ns=stamps.array(),
-            angle_min=self.angle_min,
-            angle_increment=self.angle_increment,
-            beams=self.beams,
-            scanner=scanner,
-        )
 
     def is_as_stored(self, name: str) -> bool:
         """Whether the rows of an array lie in the file as they are to be read."""
@@ -193,7 +162,8 @@ class ScanArchive:
         return order.astype(np.int64)
 
     @contextmanager
-    def _open(self) -> Generator[zipfile.ZipFile]:
+    def open(self) -> Generator[zipfile.ZipFile]:
+        """Open the zip; raises FileFormatError when it cannot be read, also for what is done while it is open."""
         try:
             with zipfile.ZipFile(self.path) as archive:
                 yield archive
@@ -333,6 +303,43 @@ class ScanArchive:
 
     def _error(self, name: str, problem: str, remedy: str) -> FileFormatError:
         return FileFormatError(self.path, f"array {name}" if name else "", problem, remedy)
+
+
+def ordered_rows(
+    packed: IO[bytes], layout: tuple[tuple[int, ...], np.dtype[Any], bool], order: IntArray | None
+) -> IO[bytes]:
+    """Write the rows of an array into a temporary file, in another order or one that lies by columns.
+
+    Parameters
+    ----------
+    packed : at the first number; all are read.
+    layout : shape, type, and whether the numbers lie column by column.
+    order : (K,) rows that are wanted; None: all as they are.
+
+    Returns
+    -------
+    file : at its first row.
+
+    Raises
+    ------
+    OSError
+        there is no room on the disk.
+    """
+    shape, dtype, by_columns = layout
+    with tempfile.TemporaryFile() as unpacked:
+        shutil.copyfileobj(packed, unpacked, BYTES_AT_ONCE)
+        unpacked.flush()
+        if unpacked.tell() < math.prod(shape) * dtype.itemsize:
+            raise EOFError("it ends early")
+        wanted = np.arange(shape[0]) if order is None else order
+        file = tempfile.TemporaryFile()
+        if len(wanted):
+            rows = np.memmap(unpacked, dtype, "r", shape=shape, order="F" if by_columns else "C")
+            at_once = max(1, BYTES_AT_ONCE // max(1, math.prod(shape[1:]) * dtype.itemsize))
+            for first in range(0, len(wanted), at_once):
+                file.write(np.ascontiguousarray(rows[wanted[first : first + at_once]]).tobytes())
+        file.seek(0)
+        return file
 
 
 def _row(values: NDArray[Any], index: int) -> str:

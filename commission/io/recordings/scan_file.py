@@ -6,31 +6,30 @@ system removes with the program. Stamps, angles and numbers of beams are in memo
 
 from __future__ import annotations
 
-import math
-import shutil
 import tempfile
 import threading
 import weakref
 import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from commission.errors import FileFormatError
-from commission.geometry.arrays import FloatArray, IntArray
+from commission.geometry.arrays import FloatArray, Growing, IntArray
 from commission.io.reading import cannot_read
-from commission.site.record_store import ScanLog
+from commission.io.recordings.scan_archive import BYTES_AT_ONCE, ROWS, ScanArchive
+from commission.site.record_store import ScanLog, ScanStore
 from commission.site.records import Scan
 
-if TYPE_CHECKING:
-    from commission.io.recordings.scan_archive import ScanArchive
-
-_BYTES_AT_ONCE = 4_000_000
 _LOCAL_HEADER = 30
 """Bytes of the fixed part of the header before each member of a zip; the lengths of name and extra field end it."""
+
+
+IN_MEMORY = 64_000_000
+"""Bytes of scans that are kept in memory; those of a larger recording stay in the file."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -139,47 +138,10 @@ def array_place(archive: ScanArchive, zipped: zipfile.ZipFile, name: str) -> Arr
     unpacked = tempfile.TemporaryFile()
     with zipped.open(info) as member:
         member.read(info.file_size - size)
-        while data := member.read(_BYTES_AT_ONCE):
+        while data := member.read(BYTES_AT_ONCE):
             unpacked.write(data)
     unpacked.flush()
     return ArrayPlace(0, unpacked)
-
-
-def ordered_rows(
-    packed: IO[bytes], layout: tuple[tuple[int, ...], np.dtype[Any], bool], order: IntArray | None
-) -> IO[bytes]:
-    """Write the rows of an array into a temporary file, in another order or one that lies by columns.
-
-    Parameters
-    ----------
-    packed : at the first number; all are read.
-    layout : shape, type, and whether the numbers lie column by column.
-    order : (K,) rows that are wanted; None: all as they are.
-
-    Returns
-    -------
-    file : at its first row.
-
-    Raises
-    ------
-    OSError
-        there is no room on the disk.
-    """
-    shape, dtype, by_columns = layout
-    with tempfile.TemporaryFile() as unpacked:
-        shutil.copyfileobj(packed, unpacked, _BYTES_AT_ONCE)
-        unpacked.flush()
-        if unpacked.tell() < math.prod(shape) * dtype.itemsize:
-            raise EOFError("it ends early")
-        wanted = np.arange(shape[0]) if order is None else order
-        file = tempfile.TemporaryFile()
-        if len(wanted):
-            rows = np.memmap(unpacked, dtype, "r", shape=shape, order="F" if by_columns else "C")
-            at_once = max(1, _BYTES_AT_ONCE // max(1, math.prod(shape[1:]) * dtype.itemsize))
-            for first in range(0, len(wanted), at_once):
-                file.write(np.ascontiguousarray(rows[wanted[first : first + at_once]]).tobytes())
-        file.seek(0)
-        return file
 
 
 def joined_scans(blocks: Sequence[ScanLog]) -> ScanLog:
@@ -198,4 +160,37 @@ def joined_scans(blocks: Sequence[ScanLog]) -> ScanLog:
         intensities=column("intensities"),
         reflector=column("reflector"),
         scanner=blocks[0].scanner,
+    )
+
+
+def load_scans(archive: ScanArchive, scanner: int = 0) -> ScanStore | None:
+    """Check all scans of an archive, and keep them in memory or in the file, by their size; None when there are none.
+
+    Parameters
+    ----------
+    archive : where they are.
+    scanner : which scanner they are of: index into the names that the log has.
+
+    Raises
+    ------
+    FileFormatError
+        as `ScanArchive.blocks`, or what is compressed finds no room on the disk.
+    """
+    if len(archive) == 0:
+        return None
+    if sum(len(archive) * column.row_bytes for column in archive.columns.values()) <= IN_MEMORY:
+        return replace(joined_scans(list(archive.blocks())), scanner=scanner)
+    stamps = Growing(np.int64)
+    for block in archive.blocks():
+        stamps.append(block.stamps_ns)
+    with archive.open() as zipped:
+        places = {name: array_place(archive, zipped, name) for name in ROWS if name in archive.columns}
+    return ScanFile(
+        archive=archive,
+        places=places,
+        stamps_ns=stamps.array(),
+        angle_min=archive.angle_min,
+        angle_increment=archive.angle_increment,
+        beams=archive.beams,
+        scanner=scanner,
     )

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from commission.io.recordings import scan_archive
+from commission.io.recordings import scan_file
 from commission.io.recordings.base import load_log, open_recording
 from commission.site.records import Detections, Odometry, ReferencePose, Scan
 
@@ -93,8 +93,8 @@ def test_what_is_in_order_is_told_nothing_of(tmp_path: Path) -> None:
 def test_arrays_by_columns_and_scans_out_of_order_are_read_as_if_they_lay_right(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, streamed: bool, in_memory: int, at_once: int
 ) -> None:
-    monkeypatch.setattr(scan_archive, "IN_MEMORY", in_memory)
-    monkeypatch.setattr("commission.io.recordings.scan_file._BYTES_AT_ONCE", at_once)
+    monkeypatch.setattr(scan_file, "IN_MEMORY", in_memory)
+    monkeypatch.setattr("commission.io.recordings.scan_archive.BYTES_AT_ONCE", at_once)
     with_scans(
         tmp_path,
         ranges=np.asfortranarray(RANGES),

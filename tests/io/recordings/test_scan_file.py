@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from commission.errors import FileFormatError
-from commission.io.recordings import scan_archive
+from commission.io.recordings import scan_file
 from commission.io.recordings.base import load_log, open_recording
 from commission.io.recordings.csv_writer import write_recording
 from commission.io.recordings.scan_file import ScanFile
@@ -64,7 +64,7 @@ def folder(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
 
 
 def in_file(folder: Path, monkeypatch: pytest.MonkeyPatch) -> RecordLog:
-    monkeypatch.setattr(scan_archive, "IN_MEMORY", 0)
+    monkeypatch.setattr(scan_file, "IN_MEMORY", 0)
     log = load_log(folder)
     assert isinstance(log.scans[0], ScanFile)
     return log
