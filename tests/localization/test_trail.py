@@ -211,11 +211,11 @@ def test_reflectors_in_view_are_those_whose_bearing_and_range_are_within_the_lim
         # The second one is of another scanner.
         eyes = np.array([(0, first, width, nearest, farthest), (1, -math.pi, 2.0 * math.pi, 0.0, 99.0)])
         pose = PoseGaussian(*rng.uniform(-8.0, 8.0, 2), rng.uniform(-9.0, 9.0), 1.0, 0.0, 0.0, 1.0, 0.0, 1.0)
-        view = range_bearing(np.array(pose[:3]), CAMERA.mounting, around.places[:, :2])
+        view = range_bearing(np.array(pose[:3]), CAMERA.mounting, around.reflectors.places[:, :2])
         turned = np.mod(view[:, 1] - first, 2.0 * math.pi)
         near = (view[:, 0] >= nearest) & (view[:, 0] <= min(farthest, longest))
         expected = max(1, int(np.sum(near & (turned <= width))))
-        assert in_view(pose, model, 0, eyes, longest, around.places) == expected, case
+        assert in_view(pose, model, 0, eyes, longest, around.reflectors.places) == expected, case
 
 
 def test_poses_of_one_place_are_led_along_once_the_likeliest_of_them() -> None:
