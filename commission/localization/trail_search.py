@@ -2,6 +2,7 @@
 
 `hypotheses` judges by things that came back and are joined by odometry; where they do not, or odometry drifts too far
 before enough of them have been seen, each hypothesis is judged by what it makes of all scans of the way (`trail_fit`).
+So it is where things alone do not tell it for long: three of four that fit are no proof at a single place.
 """
 
 from __future__ import annotations
@@ -36,14 +37,14 @@ SPARSE = 4.0
 """Detections a scan on average from which on things that come back tell it sooner."""
 AFTER_S = 2.0
 """The search has been going on for so long [s]: where scans hold enough, it has ended by then."""
+AFTER_ALL_S = 5.0
+"""After so long [s], scans that hold enough have not told it: one of few reflectors may stand elsewhere, or be gone."""
 KEPT = 12
 """Hypotheses that are carried on."""
 NEW_WAY = 1.0
 """Part of the way, see `way_between`, between two attempts at least."""
 TRIED = 16
 """Poses that pairs suggest and that are led along, those that most things fit."""
-ALIKE = 0.25
-"""Poses within that part of one place are led along once: they come to stand at the same place."""
 ODDS_AGAINST_NONE = 1e4
 """How much likelier it must be than that what is seen is none of the map's reflectors; than all others as `ODDS`
 says. With maps of other places a real robot reached 1e3 at most, in 48 minutes of driving."""
@@ -57,15 +58,18 @@ FEWEST_PLACES = 3.0
 """Places of the map that must have been seen by it."""
 
 
-def is_sparse(search: Search) -> bool:
-    """Whether scans see so little that the way as a whole has to tell.
+def has_to_tell(search: Search, now_ns: int) -> bool:
+    """Whether the way as a whole has to tell: scans see too little, or things that came back have not told it for long.
 
     Parameters
     ----------
     search : with the newest scan taken in.
+    now_ns : its stamp [ns].
     """
     trail = search.trail
-    return len(trail.scans) > 1 and len(trail.seen) < SPARSE * len(trail.scans)
+    if len(trail.scans) < 2:
+        return False
+    return len(trail.seen) < SPARSE * len(trail.scans) or now_ns - search.since_ns > AFTER_ALL_S * 1e9
 
 
 def explained_again(search: Search, belief: PoseGaussian | None, now_ns: int, around: SearchMap) -> Search:
@@ -78,7 +82,7 @@ def explained_again(search: Search, belief: PoseGaussian | None, now_ns: int, ar
     now_ns : stamp of the newest scan [ns].
     around : the map to search.
     """
-    if not is_sparse(search):
+    if not has_to_tell(search, now_ns):
         return replace(search, explained=read_only(search.explained[:0])) if len(search.explained) else search
     if search.way < NEW_WAY or now_ns - search.since_ns < AFTER_S * 1e9:
         return search
@@ -95,14 +99,13 @@ def explained_again(search: Search, belief: PoseGaussian | None, now_ns: int, ar
         around.reflectors,
         found,
     )
-    poses = [base_poses(search.explained, search.track), compose(found[: min(count, TRIED), :3], track)]
+    known = (base_poses(each, search.track) for each in (search.explained, search.hypotheses))
+    poses = [*known, compose(found[: min(count, TRIED), :3], track)]
     if belief is not None:
         poses.append(np.array(((belief.x, belief.y, belief.theta),)))
-    tried = np.concatenate(poses)
-    tried = tried[each_place_once(tried, len(tried), ALIKE)]
-    explained = np.empty((len(tried), 12))
+    explained = np.empty((sum(map(len, poses)), 12))
     explain(
-        read_only(tried),
+        read_only(np.concatenate(poses)),
         search.trail,
         around.models,
         around.eyes,
@@ -142,8 +145,11 @@ def _ranked(explained: FloatArray, search: Search, belief: PoseGaussian | None, 
 def _is_alone(ranked: FloatArray) -> bool:
     """Whether the first hypothesis is far likelier than all others, and than none."""
     best, none = float(ranked[0, 9]), float(ranked[0, 12])
-    others = float(np.exp(np.minimum(ranked[1:, 9] - best, 0.0)).sum())
-    return others * ODDS <= 1.0 and math.exp(min(none - best, 0.0)) * ODDS_AGAINST_NONE <= 1.0
+    others = np.exp(np.minimum(ranked[1:, 9] - best, 0.0))
+    # One that leaves too much unexplained can itself not be believed: it is one of the ways to be none of them.
+    is_weak = ranked[1:, 12] >= ranked[1:, 9]
+    nowhere = float(others[is_weak].sum()) + math.exp(min(none - best, 0.0))
+    return float(others[~is_weak].sum()) * ODDS <= 1.0 and nowhere * ODDS_AGAINST_NONE <= 1.0
 
 
 def _may_be_believed(

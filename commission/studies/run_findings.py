@@ -6,7 +6,7 @@ from commission.progress import Progress, part, silent
 from commission.studies.bearing_figures import bearing_findings
 from commission.studies.consistency_findings import noise_findings
 from commission.studies.contour_figures import contour_findings
-from commission.studies.map_shape_findings import map_shape_findings
+from commission.studies.displaced import misplaced_findings
 from commission.studies.misfit import MisfitInput, misfit
 from commission.studies.plausibility import Finding, PlausibilityInput, plausibility
 from commission.studies.run import RunResult
@@ -47,7 +47,7 @@ def run_findings(result: RunResult, progress: Progress = silent) -> tuple[Findin
     )
     before = plausibility(recording_input(result), part(progress, 0.0, JUDGED_BEFORE))
     found = misfit(inputs, part(progress, JUDGED_BEFORE, 1.0))
-    shape = map_shape_findings(result)
+    shape = misplaced_findings(result)
     # A factor of the noise says little where the setup itself is another one, or the map.
     noise = noise_findings(result.columns) if not found and not shape else ()
     columns = result.columns

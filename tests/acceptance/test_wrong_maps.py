@@ -13,17 +13,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from commission.localization.estimate import Belief
+from commission.localization.estimate import Belief, Mode
 from commission.simulation.drive import DriveOptions
 from commission.simulation.scenario import start_of, virtual_drive
 from commission.site.disturbances import ConstantErrors
 from commission.site.parameters import Parameters
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
-from commission.studies.map_shape_findings import map_shape_findings
+from commission.studies.displaced import misplaced_findings
 from commission.studies.plausibility import Finding
-from commission.studies.run import RunInput, judged_run
-from commission.studies.start import Start, StartOrigin
+from commission.studies.run import RunInput, RunResult, judged_run
+from commission.studies.start import Start, StartOrigin, unknown_start
 from tests.acceptance.test_operational import PEOPLE, SITES, hall
 from tests.conftest import Seeds, few_of
 
@@ -36,7 +36,14 @@ def findings_of(world: Project, seed: int, believed: Project | None = None) -> t
     log = virtual_drive(world, route, seed, options=DriveOptions(whole_scans=False))
     begin = start_of(world, route)
     start = Start(Belief(0, begin.pose, np.diag(begin.sigmas**2)), StartOrigin.DRIVE)
-    return map_shape_findings(judged_run(RunInput.of(believed or world, log, start)))
+    return misplaced_findings(judged_run(RunInput.of(believed or world, log, start)))
+
+
+def switched_on(world: Project, seed: int, believed: Project) -> RunResult:
+    """A drive through a world, localized with another map by a vehicle that is not told where it starts."""
+    route = world.routes[seed % len(world.routes)].name
+    log = virtual_drive(world, route, seed, options=DriveOptions(whole_scans=False))
+    return judged_run(RunInput.of(believed, log, unknown_start(believed, log)))
 
 
 def drawn(project: Project, people: int) -> Project:
@@ -78,3 +85,49 @@ def test_a_survey_that_is_a_hand_off_is_said_whatever_becomes_of_the_vehicle(
         believed = replace(world, reflectors=ReflectorMap(tuple(moved)))
         assert findings_of(world, seed) == (), seed
         assert len(findings_of(world, seed, believed)) == 1, seed
+
+
+MOVES = (0.2, 0.3, 0.5, 0.8, 1.0, 2.0)
+"""How far one of four is moved [m]."""
+
+
+@pytest.mark.parametrize("index", few_of(range(4), (0, 3)))
+def test_where_one_of_four_stands_elsewhere_the_vehicle_is_found_by_the_others_and_says_which(
+    repository: Path, seeds: Seeds, index: int
+) -> None:
+    world = hall(repository / "maps", "laboratory")
+    reflectors = list(world.reflectors.reflectors)
+    name = reflectors[index].id
+    for number in seeds(2, 4 * len(MOVES)):
+        far, turn = MOVES[(2 * number + 1) % len(MOVES)], 0.4 + 1.57 * (number // len(MOVES))
+        moved = replace(
+            reflectors[index],
+            x=reflectors[index].x + far * math.cos(turn),
+            y=reflectors[index].y + far * math.sin(turn),
+        )
+        believed = replace(world, reflectors=ReflectorMap((*reflectors[:index], moved, *reflectors[index + 1 :])))
+        result = switched_on(world, number, believed)
+        operational = result.columns.modes == Mode.OPERATIONAL
+        # At rest for the first second; then a way of a metre or two tells it.
+        assert operational.mean() > 0.5, (far, turn)
+        assert result.position_errors[operational].max() < 0.03, (far, turn)
+        told = misplaced_findings(result)
+        # What stands a room away may be another one as well; so may what the map has behind a wall.
+        assert len(told) == 1 or far > 0.8, (far, turn, told)
+        assert all(f"{name} " in each.found for each in told)
+
+
+@pytest.mark.parametrize("site", few_of(SITES, ("laboratory",)))
+def test_a_vehicle_that_is_switched_on_with_another_map_is_never_found_in_it(
+    repository: Path, seeds: Seeds, site: str
+) -> None:
+    world = replace(hall(repository / "maps", site), floor_map=None)
+    low, high = world.reflectors.centers.min(axis=0), world.reflectors.centers.max(axis=0)
+    for seed in seeds(2, 6):
+        rng = np.random.default_rng(seed)
+        for factor in (1, 3):
+            places = rng.uniform(low, high, (factor * len(world.reflectors), 2)).tolist()
+            first = world.reflectors.reflectors[0]
+            others = (replace(first, id=f"R{at}", x=x, y=y) for at, (x, y) in enumerate(places))
+            result = switched_on(world, seed, replace(world, reflectors=ReflectorMap(tuple(others))))
+            assert not (result.columns.modes == Mode.OPERATIONAL).any(), (seed, factor)

@@ -16,8 +16,8 @@ from commission.site.project import Project
 from commission.site.record_log import RecordLog
 from commission.site.reflectors import ReflectorMap
 from commission.site.uncertainty import Uncertainty
+from commission.studies.displaced import misplaced_findings
 from commission.studies.map_shape import MapShape, map_shape
-from commission.studies.map_shape_findings import map_shape_findings
 from commission.studies.plausibility import Finding
 from commission.studies.run import RunInput, RunResult, judged_run
 from commission.studies.run_findings import run_findings
@@ -46,7 +46,7 @@ def shape_of(project: Project, log: RecordLog) -> MapShape:
 
 
 def findings_of(project: Project, log: RecordLog) -> tuple[Finding, ...]:
-    return map_shape_findings(localized(project, log))
+    return misplaced_findings(localized(project, log))
 
 
 def without(project: Project, *names: str) -> Project:
@@ -162,4 +162,22 @@ def test_numbers_at_the_edge_of_sense_say_nothing_of_the_map(sigmas: tuple[float
     project = replace(PROJECT, parameters=replace(PROJECT.parameters, observation=observation))
     elsewhere = replace(start(), mean=start().mean + np.array([off, -off, 0.0]))
     result = judged_run(RunInput.of(project, drive(10.0), Start(elsewhere, StartOrigin.DRIVE)))
-    assert map_shape_findings(result) == ()
+    assert misplaced_findings(result) == ()
+
+
+@pytest.mark.parametrize(("move", "is_told"), [((0.7, 0.0), True), ((-0.9, 1.2), True), ((2.5, 2.5), False)])
+def test_a_reflector_that_is_seen_beside_its_place_alone_is_named(move: tuple[float, float], is_told: bool) -> None:
+    told = findings_of(with_moved(PROJECT, {"R5": move}), drive())
+    if not is_told:
+        assert told == ()
+        return
+    (finding,) = told
+    assert finding.found.startswith("R5 is seen nowhere at its place, in ")
+    beside = finding.found.split("stands ")[1].split(" mm")[0]
+    assert float(beside) == pytest.approx(1e3 * math.hypot(*move), abs=10.0)
+
+
+def test_a_thing_beside_a_reflector_that_is_seen_is_none_that_was_moved() -> None:
+    log, project = drive(), PROJECT
+    more = replace(project.reflectors.reflectors[2], id="S", x=project.reflectors.reflectors[2].x + 0.8)
+    assert findings_of(replace(project, reflectors=ReflectorMap((*project.reflectors.reflectors, more))), log) == ()

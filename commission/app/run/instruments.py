@@ -14,9 +14,9 @@ from commission.app.run.found_table import Found
 from commission.app.run.state import PlotWindow
 from commission.progress import Progress, part
 from commission.site.floor_map import FloorMap
+from commission.studies.displaced import misplaced_findings
 from commission.studies.events import EventsInput, events
 from commission.studies.integrity import protection
-from commission.studies.map_shape_findings import map_shape_findings
 from commission.studies.reflector_figures import ReflectorFiguresInput, reflector_figures
 from commission.studies.run import RunResult
 
@@ -48,7 +48,7 @@ class Instruments:
             happened = events(EventsInput(result), part(progress, 0.0, 0.4))
             contributed = reflector_figures(figures, part(progress, 0.4, 0.9))
             progress(0.9, "where reflectors stand to each other")
-            return Found(happened, contributed, map_shape_findings(result))
+            return Found(happened, contributed, misplaced_findings(result, contributed))
 
         self._jobs.start("Events and reflectors", look, then=self._keep, is_shown=False)
 

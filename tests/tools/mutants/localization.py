@@ -24,6 +24,15 @@ SEVERAL = TESTS + "test_several_scans.py::"
 
 LOCALIZATION = (
     Mutant(
+        name="one of four that stands elsewhere keeps a vehicle from being found",
+        file="commission/localization/trail_search.py",
+        find="AFTER_ALL_S = 5.0",
+        replace="AFTER_ALL_S = 5000.0",
+        tests=(
+            "tests/acceptance/test_wrong_maps.py::test_where_one_of_four_stands_elsewhere_the_vehicle_is_found_by_the_others_and_says_which",
+        ),
+    ),
+    Mutant(
         name="a deep beam in the middle of a cluster draws its center aside",
         file=FOLDER + "clusters.py",
         find="abs(ranges[high] - ranges[middle]) <= deep",

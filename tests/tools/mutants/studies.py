@@ -21,7 +21,7 @@ STUDIES = (
     ),
     Mutant(
         name="a map that makes the vehicle lost is not looked at",
-        file=FOLDER + "map_shape_findings.py",
+        file=FOLDER + "map_shape_told.py",
         find="LOST_SHARE = 0.2",
         replace="LOST_SHARE = 1.0",
         tests=(TESTS + "test_map_shape.py::test_a_map_that_makes_the_vehicle_lost_is_named_all_the_same",),

@@ -1,4 +1,4 @@
-"""What a run says of the map as a whole, in words: reflectors that do not stand to each other as it says."""
+"""What a run says of the map, in words: reflectors that do not stand to each other as it says."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ MOST_NAMED = 6
 """Reflectors that are named one by one."""
 
 
-def map_shape_findings(result: RunResult) -> tuple[Finding, ...]:
-    """Name the reflectors that do not stand to the others as the map says.
+def shape_of_map(result: RunResult) -> MapShape | None:
+    """Hold what a drive has seen against the map.
 
     Parameters
     ----------
-    result : the run; of several setups on the way nothing is said.
+    result : the run.
 
     Returns
     -------
-    findings : one or none.
+    shape : None where there were several setups on the way.
 
     Notes
     -----
@@ -43,12 +43,12 @@ def map_shape_findings(result: RunResult) -> tuple[Finding, ...]:
     """
     first, *others = result.inputs.segments
     if others:
-        return ()
+        return None
     columns, setup = result.columns, first.setup
     shape = map_shape(columns, setup)
     if not shape.wrong and float(np.mean(columns.modes == Mode.LOST)) > LOST_SHARE:
         shape = map_shape(_localized_freely(result, columns, setup), setup)
-    return _told(shape, setup) if shape.wrong else ()
+    return shape
 
 
 def _localized_freely(result: RunResult, columns: RunColumns, setup: LocalizerSetup) -> RunColumns:
@@ -63,8 +63,16 @@ def _localized_freely(result: RunResult, columns: RunColumns, setup: LocalizerSe
     return whole_run.run(result.inputs.log, freed, result.inputs.start.state(), detected=columns.detected)
 
 
-def _told(shape: MapShape, setup: LocalizerSetup) -> tuple[Finding, ...]:
-    """Say which reflectors are wrong, how far, and what to do."""
+def told_of(shape: MapShape, setup: LocalizerSetup) -> tuple[Finding, ...]:
+    """Say which reflectors are wrong, how far, and what to do; nothing where none is.
+
+    Parameters
+    ----------
+    shape : what scans say of the map.
+    setup : its reflectors.
+    """
+    if not shape.wrong:
+        return ()
     names = [each.id for each in setup.reflectors.reflectors]
     far = np.hypot(shape.off[:, 0], shape.off[:, 1])
     worst = sorted(shape.wrong, key=lambda index: -far[index])
