@@ -80,7 +80,9 @@ def log_missed(  # noqa: PLR0917 - a pose, number by number
     """
     c, s = math.cos(t), math.sin(t)
     views = sights.views
-    total = 0.0
+    total, farthest = 0.0, 0.0
+    for e in range(len(sights.eyes)):
+        farthest = max(farthest, sights.eyes[e, 4] ** 2)
     for entry in range(len(places)):
         if total < least:
             break
@@ -89,7 +91,10 @@ def log_missed(  # noqa: PLR0917 - a pose, number by number
         share, logs = 0.0, 0.0
         for v in range(len(views)):
             vx, vy = x + c * views[v, 0] - s * views[v, 1], y + s * views[v, 0] + c * views[v, 1]
-            log_unseen = _log_unseen(v, vx, vy, t + views[v, 2], entry, sights, places)
+            dx, dy, log_unseen = places[entry, 0] - vx, places[entry, 1] - vy, 0.0
+            # Most are out of range: no function is called for them, which counts references of every array.
+            if dx * dx + dy * dy <= farthest:
+                log_unseen = _log_unseen(v, vx, vy, t + views[v, 2], entry, sights, places)
             if log_unseen < 0.0:
                 share += views[v, 4]
                 logs += views[v, 4] * log_unseen
