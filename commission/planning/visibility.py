@@ -180,11 +180,10 @@ class VisibilityModel:
         blind = np.empty((0, 2)) if all_round else self.scanner.blind_sectors
         offsets = np.zeros(len(mask) + 1, dtype=np.int64)
         # Two passes over the bits: the first counts, so that the second writes into an array of the right size.
-        nothing = np.empty(0, dtype=np.int64)
-        _list_visible(mask, T_map_scanner, self.targets.centers, first, width, blind, offsets, nothing)
+        _keep_visible(mask, T_map_scanner, self.targets.centers, first, width, blind, offsets)
         np.cumsum(offsets, out=offsets)
         indices = np.empty(offsets[-1], dtype=np.int64)
-        _list_visible(mask, T_map_scanner, self.targets.centers, first, width, blind, offsets, indices)
+        _list_bits(mask, indices)
         return VisibleReflectors(offsets, indices)
 
     def with_reflector(self, index: int, reflector: Reflector) -> VisibilityModel:
@@ -419,30 +418,56 @@ def is_blind(bearing: float, blind: FloatArray) -> bool:
 
 
 @compiled
-def _list_visible(  # noqa: PLR0917 - two passes share one loop
+def _keep_visible(  # noqa: PLR0917 - bits, poses and where they look
     mask: BitMask,
     poses: FloatArray,
     centers: FloatArray,
     first: float,
     width: float,
     blind: FloatArray,
-    offsets: IntArray,
-    out: IntArray,
+    counts: IntArray,
 ) -> None:
-    """Count into `offsets` when `out` is empty, otherwise write the indices that fit between the offsets."""
-    counting = len(out) == 0
+    """Clear the bits of reflectors that lie outside of the field of view; count those that stay, one row further on.
+
+    Notes
+    -----
+    No formula: `in_field_of_view` of each bit that is set.
+    """
     for n in range(len(poses)):
         found = 0
-        for m in range(len(centers)):
-            if (mask[n, m >> 6] >> np.uint64(m & 63)) & np.uint64(1) == 0:
-                continue
-            bearing = math.atan2(centers[m, 1] - poses[n, 1], centers[m, 0] - poses[n, 0]) - poses[n, 2]
-            if in_field_of_view(bearing, first, width) and not is_blind(bearing, blind):
-                if not counting:
-                    out[offsets[n] + found] = m
-                found += 1
-        if counting:
-            offsets[n + 1] = found
+        for word in range(mask.shape[1]):
+            bits, kept, m = mask[n, word], mask[n, word], word << 6
+            while bits:
+                if bits & np.uint64(1):
+                    bearing = math.atan2(centers[m, 1] - poses[n, 1], centers[m, 0] - poses[n, 0]) - poses[n, 2]
+                    if in_field_of_view(bearing, first, width) and not is_blind(bearing, blind):
+                        found += 1
+                    else:
+                        kept &= ~(np.uint64(1) << np.uint64(m & 63))
+                bits >>= np.uint64(1)
+                m += 1
+            mask[n, word] = kept
+        counts[n + 1] = found
+
+
+@compiled
+def _list_bits(mask: BitMask, out: IntArray) -> None:
+    """Write the number of each bit that is set, row by row.
+
+    Notes
+    -----
+    No formula: it lists.
+    """
+    at = 0
+    for n in range(len(mask)):
+        for word in range(mask.shape[1]):
+            bits, m = mask[n, word], word << 6
+            while bits:
+                if bits & np.uint64(1):
+                    out[at] = m
+                    at += 1
+                bits >>= np.uint64(1)
+                m += 1
 
 
 def warm_up() -> None:
