@@ -22,6 +22,7 @@ from commission.site.record_log import RecordLog
 from tests.io.protocols.captures import fragments, instance
 from tests.io.recordings import captured_packets as made
 from tests.io.recordings import ros_bags as bags
+from tests.io.recordings.test_captured_messages import bridge, datagrams, pose
 from tests.io.recordings.test_carmen import flaser, log_of
 from tests.io.recordings.test_cut_recordings import cola_packets
 from tests.io.recordings.test_mcap_recording import NAMES, steps
@@ -40,6 +41,8 @@ def sound(folder: Path) -> dict[str, Path]:
         "pcap": made.write_pcap(folder / "a.pcap", packets),
         "pcapng": made.write_pcapng(folder / "a.pcapng", packets, order=">"),
         "pcap of TCP": made.write_pcap(folder / "tcp.pcap", cola_packets(4), nanoseconds=True),
+        "pcap of JSON": made.write_pcap(folder / "json.pcap", datagrams(NAMES, [pose(i) for i in range(9)])),
+        "pcap of rosbridge": made.write_pcap(folder / "bridge.pcap", bridge(is_cbor=True)),
         "CARMEN": log_of(folder, *(flaser([1.0, 2.0], (0.1 * i, 0.0, 0.0), 9.0 + i, 1.0 + i) for i in range(9))),
     }
     for ending in (".mcap", ".db3", ".bag"):
@@ -47,6 +50,8 @@ def sound(folder: Path) -> dict[str, Path]:
         found[f"{ending} of others"] = path if path.is_file() else next(path.glob(f"*{ending}"))
         found[f"own {ending}"] = folder / f"own{ending}"
         write_records(folder / f"own{ending}", steps(6), scanners=NAMES)
+    found["ROS 1, cut"] = folder / "cut.bag"
+    found["ROS 1, cut"].write_bytes(found[".bag of others"].read_bytes()[:-200])
     write_recording(folder / "tables", steps(6), scanners=NAMES)
     for name in ("odometry.csv", "detections.csv", "reference.csv", "scans_rear.npz"):
         found[name] = folder / "tables" / name

@@ -10,8 +10,8 @@ from commission.io.recordings.base import load_log
 from tests.tools.fuzz_readers import check, fuzz, sound
 
 NAMES = tuple(
-    "pcap|pcapng|pcap of TCP|CARMEN|.mcap of others|own .mcap|.db3 of others|own .db3|.bag of others|own .bag|"
-    "odometry.csv|detections.csv|reference.csv|scans_rear.npz".split("|")
+    "pcap|pcapng|pcap of TCP|pcap of JSON|pcap of rosbridge|CARMEN|.mcap of others|own .mcap|.db3 of others|own .db3|"
+    ".bag of others|own .bag|ROS 1, cut|odometry.csv|detections.csv|reference.csv|scans_rear.npz".split("|")
 )
 
 

@@ -89,6 +89,26 @@ _Any: TypeAlias = _Odometry | _Scan | _Detections | _Tags | _Reflex | _Reference
 _DECODER: msgspec.json.Decoder[_Any] = msgspec.json.Decoder(_Any)
 
 
+class _Head(Struct):
+    """What tells of whom a message is."""
+
+    type: str
+    scanner: str | None = None
+
+
+_HEADS: msgspec.json.Decoder[_Head] = msgspec.json.Decoder(_Head)
+_TYPES = frozenset(("odometry", "scan", "detections", "tags", "reflex", "reference"))
+
+
+def named_scanner(data: bytes) -> str | None:
+    """Return the name of the scanner in a message, empty where it names none; None where it is no message of these."""
+    try:
+        head = _HEADS.decode(data)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        return None
+    return (head.scanner or "") if head.type in _TYPES else None
+
+
 def decode_message(data: bytes, scanners: Sequence[str]) -> LiveMessage:
     """Decode one message.
 

@@ -6,7 +6,7 @@ Each sender is a scanner. A telegram that cannot be decoded is counted and left 
 from __future__ import annotations
 
 from collections import Counter, OrderedDict, deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 
 from commission.errors import DecodeError, FileFormatError
@@ -16,6 +16,7 @@ from commission.io.recordings.channels import NO_OPTIONS, ChannelOptions, Role, 
 from commission.io.recordings.collector import Collector
 from commission.io.recordings.device_clock import DeviceClock
 from commission.io.recordings.pcap import is_capture, payloads
+from commission.io.recordings.spoken import Spoken
 from commission.io.recordings.whole import WholeRecording
 from commission.site.record_log import RecordLog
 from commission.site.records import Scan
@@ -34,21 +35,22 @@ class Capture(WholeRecording):
         """Open a capture; raises FileFormatError where it holds no telegram that is read."""
         self.path = path
         told = Counter[str]()
-        senders = dict(_senders(path, told))
-        if not senders:
-            remedy = "telegrams of SICK CoLa (LMDscandata), NAV350, Compact or safety scanners"
+        self._messages = Spoken(path)
+        senders = dict(_senders(path, told, self._messages))
+        if not senders and not self._messages.programs:
+            remedy = "telegrams of SICK CoLa (LMDscandata), NAV350, Compact or safety scanners, JSON or rosbridge"
             why = "; ".join(f"{count} {what}" for what, count in told.items() if count)
             raise FileFormatError(path, "", f"holds no telegram that is read{f' ({why})' if why else ''}", remedy)
+        senders |= self._messages.scanners()
         topics = [Topic(name=f"{name}/scan", type=kind, role=Role.SCAN) for name, kind in senders.items()]
         chosen = choose(path, topics, options) if options.channels else None
         if chosen is not None:
             named = {topic.removesuffix("/scan"): name for topic, name in chosen.scanners.items()}
-        elif len(senders) == 1:
-            named = {name: ONLY_NAME for name in senders}
         else:
-            named = {name: name.replace(".", "-").replace(":", "_") for name in senders}
+            named = _names(senders)
         self._named = named
         self._kinds = senders
+        self._devices = {name: kind for name, kind in senders.items() if name in named and kind in _DECODERS}
         self.scanners = tuple(sorted(named.values())) or (ONLY_NAME,)
 
     @staticmethod
@@ -58,9 +60,9 @@ class Capture(WholeRecording):
 
     def load(self) -> RecordLog:
         """Read everything into columns; raises FileFormatError."""
-        collector = Collector(self.path, self.scanners, None)
+        collector = Collector(self.path, self.scanners, self._messages.motion)
         try:
-            clocks = {name: DeviceClock() for name in self._named}
+            clocks = {name: DeviceClock() for name in self._devices}
             for name, (device, captured, _) in self._timed(Counter()):
                 clocks[name].learn(device, captured)
             for clock in clocks.values():
@@ -69,8 +71,10 @@ class Capture(WholeRecording):
                 scan = self._made(make, clocks[name].stamp(device, captured), name, collector)
                 if scan is not None:
                     collector.add_scan(scan)
+            indices = {name: self.scanners.index(scanner) for name, scanner in self._named.items()}
+            self._messages.collect(collector, indices)
             notes = [f"scanner {scanner!r} is {name}: {self._kinds[name]}" for name, scanner in self._named.items()]
-            return collector.log(notes)
+            return collector.log([*notes, *self._messages.notes()])
         finally:
             collector.close()
 
@@ -87,14 +91,14 @@ class Capture(WholeRecording):
         """Sender and scan of every telegram, with its times; what a scanner sends to several, once."""
         decoders: dict[tuple[str, str], Assembly] = {}
         latest: dict[tuple[str, str], int] = {}
-        taken: dict[str, deque[tuple[int, str]]] = {name: deque(maxlen=_RECENT) for name in self._named}
-        for payload in payloads(self.path, told, self._named.keys()):
+        taken: dict[str, deque[tuple[int, str]]] = {name: deque(maxlen=_RECENT) for name in self._devices}
+        for payload in payloads(self.path, told, self._devices.keys()) if self._devices else ():
             name = payload.sender
             # Each connection is a stream of its own: a scanner serves a vehicle and a setup tool at once.
             receiver = payload.receiver if payload.is_stream else ""
             flow = name, receiver
             if flow not in decoders:
-                decoders[flow] = _DECODERS[self._kinds[name]](name, told)
+                decoders[flow] = _DECODERS[self._devices[name]](name, told)
             for device, captured, make in decoders[flow].take(payload.data, payload.stamp_ns):
                 if device is not None and any(device == at and receiver != to for at, to in taken[name]):
                     told[f"telegrams of {name} went to a second receiver, too, and are taken once"] += 1
@@ -107,8 +111,24 @@ class Capture(WholeRecording):
                 yield name, (None if stands else device, captured, make)
 
 
-def _senders(path: Path, told: Counter[str]) -> Iterator[tuple[str, str]]:
-    """Address of each sender of telegrams that are read, and the name of their kind."""
+def _names(senders: Collection[str]) -> dict[str, str]:
+    """Name of each scanner: its own where it says one (behind the address), else of its address, or of the only one."""
+    own = {sender: sender.partition(" ")[2] for sender in senders}
+    if len(set(own.values())) == len(own) and all(own.values()):
+        return own
+    plain = {sender: sender.replace(".", "-").replace(":", "_").replace(" ", "_") for sender in senders}
+    return plain if len(senders) > 1 else {sender: ONLY_NAME for sender in senders}
+
+
+def _senders(path: Path, told: Counter[str], messages: Spoken) -> Iterator[tuple[str, str]]:
+    """Address of each sender of telegrams that are read, and the name of their kind.
+
+    Parameters
+    ----------
+    path : the capture.
+    told : takes what is not read.
+    messages : takes what is none of these, and finds messages in it.
+    """
     known: dict[str, str] = {}
     begins: OrderedDict[tuple[str, str], bytes] = OrderedDict()
     for payload in payloads(path, told):
@@ -127,6 +147,8 @@ def _senders(path: Path, told: Counter[str]) -> Iterator[tuple[str, str]]:
         if kind:
             known[payload.sender] = kind
             yield payload.sender, kind
+        else:
+            messages.look(payload)
 
 
 _DECODERS: dict[str, Callable[[str, Counter[str]], Assembly]] = {

@@ -46,6 +46,11 @@ MOTION_KINDS = {
 _NOT_MEASURED = ("cmd", "command", "goal", "initialpose", "initial_pose", "desired", "target")
 
 
+def is_measured(topic: str) -> bool:
+    """Whether the name of a topic is none of commands and goals."""
+    return not any(word in topic.lower() for word in _NOT_MEASURED)
+
+
 def topic_of(name: str, kind: str, count: int | None) -> tuple[Topic, ...]:
     """What a topic can be to a recording: nothing, one role, or two.
 
@@ -54,7 +59,7 @@ def topic_of(name: str, kind: str, count: int | None) -> tuple[Topic, ...]:
     name, kind : of the topic and its type.
     count : messages; None where that is not known.
     """
-    far = any(word in name.lower() for word in _NOT_MEASURED)
+    far = not is_measured(name)
     if kind in SCAN_TYPES:
         return (Topic(name=name, type=kind, role=Role.SCAN, count=count),)
     found: list[Topic] = []
