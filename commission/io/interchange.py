@@ -24,6 +24,7 @@ from commission.io.map_server import read_floor_map, write_floor_map
 from commission.io.overwriting import refuse_files
 from commission.io.project_copy import refuse_to_replace
 from commission.io.project_file import FILE_NAME, load_project, project_file, save_project
+from commission.io.recordings.bag_parts import bag_of
 from commission.io.recordings.base import is_recording
 from commission.io.recordings.channels import NO_OPTIONS, ChannelOptions
 from commission.io.recordings.conversion import convert_recording
@@ -159,6 +160,8 @@ def kind_of_source(path: Path) -> Kind:
     """Kind of an existing file or folder; raises FileFormatError when it does not exist or is none of them."""
     if not path.exists():
         raise FileFormatError(path, "", "does not exist", "a file or folder to convert")
+    if bag_of(path) != path:
+        return Kind.RECORDING
     if path.is_dir() or path.name == FILE_NAME:
         return Kind.PROJECT if project_file(path).is_file() else Kind.RECORDING
     kind = _SUFFIXES.get(path.suffix.lower())

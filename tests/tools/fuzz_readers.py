@@ -30,7 +30,7 @@ from tests.io.recordings.test_ros_bag import drive
 from tests.tools.fuzz_decoders import changed, main
 
 SLOW_S = 2.0
-"""Time in which any of these small files is read [s]."""
+"""Time of the processor in which any of these small files is read [s]."""
 
 
 def sound(folder: Path) -> dict[str, Path]:
@@ -86,7 +86,8 @@ def fuzz(count: int, seed: int) -> Counter[str]:
                 else files[name].with_name(f"changed{files[name].suffix}")
             )
             path.write_bytes(data)
-            begun = time.perf_counter()
+            # Of the processor: that the computer is busy is no fault of a reader.
+            begun = time.process_time()
             try:
                 check(load_log(path.parent if path == files[name] else path))
                 told[f"{name}: read"] += 1
@@ -101,7 +102,7 @@ def fuzz(count: int, seed: int) -> Counter[str]:
             finally:
                 if path == files[name]:
                     path.write_bytes(contents[name])
-            if time.perf_counter() - begun > SLOW_S:
+            if time.process_time() - begun > SLOW_S:
                 told[f"{name}: slower than {SLOW_S:g} s"] += 1
     return told
 

@@ -21,6 +21,12 @@ _LISTED = 4
 """Files that are named, at most."""
 
 
+def bag_of(path: Path) -> Path:
+    """Return the folder of a bag whose metadata are named, or the path itself."""
+    is_metadata = path.name == METADATA and path.is_file() and bool(_listed(path))
+    return path.parent if is_metadata else path
+
+
 def files_of(folder: Path, *endings: str) -> list[Path]:
     """Files of a folder in the order of their numbers: `bag_2` comes before `bag_10`.
 

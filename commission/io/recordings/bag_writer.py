@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from commission.io.atomic import cannot_write, staged
-from commission.io.recordings.ros_source import learn_type, ros2_types
+from commission.io.recordings.ros_types import learn_type, ros2_types
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore

@@ -8,6 +8,7 @@ from typing import Protocol
 
 from commission.errors import FileFormatError, UsageError
 from commission.io.reading import cannot_read
+from commission.io.recordings.bag_parts import bag_of
 from commission.io.recordings.capture import Capture
 from commission.io.recordings.carmen import CarmenLog
 from commission.io.recordings.channels import NO_OPTIONS, ChannelOptions
@@ -84,6 +85,7 @@ READ = "a folder with odometry.csv, a ROS bag (.mcap, .db3, .bag), a capture (.p
 
 def is_recording(path: Path) -> bool:
     """Whether an existing file or folder is a recording, by its content."""
+    path = bag_of(path)
     return any(recognizes(path) for recognizes, _ in _FORMATS)
 
 
@@ -105,6 +107,7 @@ def open_recording(path: Path, options: ChannelOptions = NO_OPTIONS) -> Recordin
     try:
         if not path.exists():
             raise FileFormatError(path, "", "does not exist", "a recording")
+        path = bag_of(path)
         for recognizes, reader in _FORMATS:
             if recognizes(path):
                 return reader(path, options)

@@ -26,7 +26,7 @@ _HEAD_LIMIT = 16_384
 """Bytes of the answer of a server that begins a connection."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Heard:
     """A message, and who sent it."""
 
@@ -86,7 +86,9 @@ def _of_datagram(payload: Payload, told: Counter[str]) -> Heard | None:
     except DecodeError as error:
         told[f"messages to {payload.receiver} cannot be decoded and are left out ({error})"] += 1
         return None
-    return Heard(payload.receiver, JSON, "", scanner, message, payload.stamp_ns)
+    return Heard(
+        program=payload.receiver, kind=JSON, topic="", scanner=scanner, message=message, captured_ns=payload.stamp_ns
+    )
 
 
 def _of_frame(payload: Payload, frame: bytes, told: Counter[str]) -> Heard | None:
@@ -102,7 +104,16 @@ def _of_frame(payload: Payload, frame: bytes, told: Counter[str]) -> Heard | Non
         told[f"messages of {payload.sender} cannot be decoded and are left out ({error})"] += 1
         return None
     name = topic.strip("/").rpartition("/")[0].rpartition("/")[2] if scans else ""
-    return None if message is None else Heard(payload.sender, ROSBRIDGE, topic, name, message, payload.stamp_ns)
+    if message is None:
+        return None
+    return Heard(
+        program=payload.sender,
+        kind=ROSBRIDGE,
+        topic=topic,
+        scanner=name,
+        message=message,
+        captured_ns=payload.stamp_ns,
+    )
 
 
 def _is_read(content: Mapping[str, Any]) -> bool:

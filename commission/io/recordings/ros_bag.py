@@ -23,6 +23,11 @@ from commission.site.recorded_mounting import RecordedMounting
 from commission.site.recorded_sweep import RecordedSweep
 from commission.site.scanner import ONLY_NAME
 
+SOON_NS = 60_000_000_000
+"""Latest first stamp of a simulation whose time began at 0 [ns]."""
+_HELD = 64
+"""Messages of a topic that wait for one whose stamp is not 0; all further ones have none."""
+
 
 class RosBag(WholeRecording):
     """A ROS bag; opening it reads its index and chooses its topics."""
@@ -73,17 +78,21 @@ class RosBag(WholeRecording):
 
     def _motion_kind(self, odometry: Topic) -> MotionKind:
         kind = ros.MOTION_KINDS[odometry.type]
-        if kind is MotionKind.WHEEL_ANGLES:
-            first = next(iter(self._bag.messages({odometry.name})), None)
-            if first is not None and not ros.has_wheel_angles(first.value):
-                return MotionKind.WHEEL_SPEEDS
+        if kind is MotionKind.WHEEL_ANGLES and self.options.wheels is not None:
+            # Other joints may have other programs that tell of them.
+            for message in self._bag.messages({odometry.name}):
+                has_angles = ros.has_wheel_angles(message.value, self.options.wheels)
+                if has_angles is not None:
+                    return kind if has_angles else MotionKind.WHEEL_SPEEDS
         return kind
 
     def _check(self) -> None:
         """Raise FileFormatError where the bag has nothing to read, or turning wheels of unknown size."""
         chosen = self.chosen
         if not chosen.scanners and chosen.odometry is None and chosen.reference is None:
-            has = ", ".join(f"{topic.name} ({topic.type})" for topic in self._bag.topics[:8]) or "none at all"
+            empty = {topic.name: ", no message" for topic in self._bag.topics if topic.count == 0}
+            read = [f"{topic.name} ({topic.type}{empty.get(topic.name, '')})" for topic in self._bag.topics]
+            has = ", ".join((*read, *self._bag.unread)[:8]) or "none at all"
             remedy = "sensor_msgs/LaserScan, nav_msgs/Odometry or geometry_msgs/PoseStamped"
             raise FileFormatError(self.path, "", f"has no topic that is read (it has {has})", remedy)
         if chosen.odometry is not None and chosen.odometry.type == "sensor_msgs/msg/JointState":
@@ -107,6 +116,7 @@ class RosBag(WholeRecording):
             except (AttributeError, TypeError, ValueError, OverflowError) as error:
                 found = f"a message is no {types[message.topic]} ({error})"
                 raise FileFormatError(self.path, message.topic, found, "the fields that ROS gives it") from error
+        reading.end()
         return [*self._chosen_notes(), *self._bag.notes, *reading.notes()]
 
     def _chosen_notes(self) -> Iterator[str]:
@@ -139,6 +149,10 @@ class _Reading:
         self._frame_of: dict[str, str] = {}
         """Frame of each scanner, by its name."""
         self._base = ""
+        self._held: dict[str, list[tuple[BagMessage, str]]] = {}
+        """Messages of a topic whose stamp is 0, until one with another stamp tells what it means."""
+        self._is_from_zero: dict[str, bool] = {}
+        """Of each topic that had such, whether its time begins at 0."""
         self._moved = ""
         """Frame that transforms move, where they are the odometry."""
         self._sweeps: dict[str, float] = {}
@@ -150,7 +164,39 @@ class _Reading:
                 self.frames.add(each)
                 self._take_transform(message, each)
             return
+        if ros.has_zero_stamp(message.value) and message.topic not in self._is_from_zero:
+            held = self._held.setdefault(message.topic, [])
+            held.append((message, kind))
+            if len(held) > _HELD:
+                self._let_go(message.topic, is_from_zero=False)
+            return
         stamp, is_own = ros.stamp_of(getattr(message.value, "header", None), message.log_time_ns)
+        if message.topic in self._held:
+            self._let_go(message.topic, is_from_zero=is_own and stamp <= SOON_NS)
+        if not is_own and self._is_from_zero.get(message.topic, False):
+            stamp, is_own = 0, True
+        self._take_stamped(message, kind, stamp, is_own=is_own)
+
+    def end(self) -> None:
+        """Take what still waits for a message with a stamp."""
+        for topic in tuple(self._held):
+            self._let_go(topic, is_from_zero=False)
+
+    def _let_go(self, topic: str, *, is_from_zero: bool) -> None:
+        """Take the messages of a topic whose stamp is 0: a time of a simulation, or none."""
+        self._is_from_zero[topic] = is_from_zero
+        for message, kind in self._held.pop(topic):
+            self._take_stamped(message, kind, 0 if is_from_zero else message.log_time_ns, is_own=is_from_zero)
+
+    def _take_stamped(self, message: BagMessage, kind: str, stamp: int, *, is_own: bool) -> None:
+        """Hand a message to the collector.
+
+        Parameters
+        ----------
+        message, kind : decoded, and the name of its type.
+        stamp : when it was [ns].
+        is_own : whether it says so itself.
+        """
         if not is_own:
             self._unstamped[message.topic] += 1
         if message.topic in self._scanner_of:
@@ -158,7 +204,8 @@ class _Reading:
         odometry, reference = self.chosen.odometry, self.chosen.reference
         if odometry is not None and message.topic == odometry.name:
             self._base = self._base or ros.base_frame(message.value, kind)
-            row = ros.motion_of(message.value, kind, self.options.wheels)
+            has_angles = self.collector.kind is not MotionKind.WHEEL_SPEEDS
+            row = ros.motion_of(message.value, kind, self.options.wheels, has_angles=has_angles)
             if row is None:
                 joints = ", ".join(map(str, list(message.value.name)[:8])) or "none"
                 why = f"without both of the wheels that --wheels names (its joints: {joints})"

@@ -80,6 +80,12 @@ def is_taken_unasked(topic: Topic) -> bool:
     return topic.rank < _FAR_AWAY
 
 
+def has_zero_stamp(message: Any) -> bool:
+    """Whether a message has a header whose stamp is 0: none, or the begin of a simulation."""
+    header = getattr(message, "header", None)
+    return header is not None and not header.stamp.sec and not header.stamp.nanosec
+
+
 def stamp_of(header: Any, log_time_ns: int) -> tuple[int, bool]:
     """Stamp of a message [ns], and whether it is its own: where it has no header or no stamp, that of the recording."""
     if header is None:
@@ -174,13 +180,14 @@ def pose_of(message: Any) -> tuple[float, float, float]:
     return float(pose.position.x), float(pose.position.y), yaw_of(pose.orientation)
 
 
-def motion_of(message: Any, kind: str, wheels: Wheels | None) -> tuple[float, ...] | None:
+def motion_of(message: Any, kind: str, wheels: Wheels | None, *, has_angles: bool = True) -> tuple[float, ...] | None:
     """Row of odometry of the kind that `MOTION_KINDS` says; None where the message has none of it.
 
     Parameters
     ----------
     message, kind : decoded, and the name of its type.
     wheels : names of the joints that turn, where it is a JointState.
+    has_angles : whether their angles count, or their speeds: one of both in all messages.
     """
     if kind == "nav_msgs/msg/Odometry":
         twist = message.twist.twist
@@ -188,7 +195,11 @@ def motion_of(message: Any, kind: str, wheels: Wheels | None) -> tuple[float, ..
         # A driver that fills in velocities only leaves the orientation at zero.
         return x, y, 0.0 if math.isnan(theta) else theta, twist.linear.x, twist.linear.y, twist.angular.z
     if kind == "sensor_msgs/msg/JointState":
-        return None if wheels is None else _wheel_turning(message, wheels)
+        return (
+            None
+            if wheels is None
+            else _of_wheels(message, message.position if has_angles else message.velocity, wheels)
+        )
     if kind == TWIST:
         twist = message
     else:
@@ -225,18 +236,23 @@ def sweep_of(message: Any) -> float:
     return math.copysign(1.0, float(message.angle_increment)) * passed if math.isfinite(passed) else 0.0
 
 
-def has_wheel_angles(message: Any) -> bool:
-    """Whether a JointState says how far its joints turned, not their speeds only."""
-    return len(message.position) > 0
+def has_wheel_angles(message: Any, wheels: Wheels) -> bool | None:
+    """Whether a JointState says how far the wheels turned, and not how fast only; None where it says neither."""
+    if _of_wheels(message, message.position, wheels) is not None:
+        return True
+    return None if _of_wheels(message, message.velocity, wheels) is None else False
 
 
-def _wheel_turning(message: Any, wheels: Wheels) -> tuple[float, float] | None:
+def _of_wheels(message: Any, values: Any, wheels: Wheels) -> tuple[float, float] | None:
+    """Numbers of the left and the right wheel; None where one of them is not there."""
     names = list(message.name)
     if wheels.left not in names or wheels.right not in names:
         return None
     left, right = names.index(wheels.left), names.index(wheels.right)
-    values = message.position if has_wheel_angles(message) else message.velocity
-    return None if len(values) <= max(left, right) else (float(values[left]), float(values[right]))
+    if len(values) <= max(left, right):
+        return None
+    found = float(values[left]), float(values[right])
+    return found if all(map(math.isfinite, found)) else None
 
 
 def transform_of(transform: Any) -> FloatArray:

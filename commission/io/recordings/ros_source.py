@@ -18,9 +18,10 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 from commission.errors import FileFormatError, reason_of
 from commission.io.reading import cannot_read
 from commission.io.recordings.bag_parts import METADATA, files_of, missing_parts, unmerged
-from commission.io.recordings.mcap_reader import MAGIC, RECORD_LIMIT, McapChannel, McapFile, Message
-from commission.io.recordings.packed_bag import ZSTD_MAGIC, packed_files, unpacked_folder
+from commission.io.recordings.mcap_reader import MAGIC, McapChannel, McapFile, Message
+from commission.io.recordings.packed_bag import packed_files, unpacked_folder
 from commission.io.recordings.ros1_file import Ros1File
+from commission.io.recordings.ros_types import learn_type, ros2_type, ros2_types, typestore_of, unpacked_message
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
@@ -61,6 +62,11 @@ class BagSource(Protocol):
     @property
     def topics(self) -> tuple[BagTopic, ...]:
         """All topics whose messages can be decoded."""
+        ...
+
+    @property
+    def unread(self) -> tuple[str, ...]:
+        """All other topics, each with how it is encoded."""
         ...
 
     def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:
@@ -125,6 +131,7 @@ class PackedSource:
         with self._named():
             self._bag = open_bag(folder if path.is_dir() else single)
         self.topics = self._bag.topics
+        self.unread = self._bag.unread
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -161,6 +168,7 @@ class McapSource:
         self._cut: list[str] = []
         self._typestores: dict[tuple[str, str, str], Typestore] = {}
         found: dict[str, tuple[str, int | None]] = {}
+        unread: dict[str, str] = {}
         for file in files:
             mcap = _file_of(file)
             counts: dict[str, int] = {}
@@ -174,7 +182,10 @@ class McapSource:
                 if channel.encoding in ("cdr", "ros1") and channel.topic in counts:
                     before = found.get(channel.topic, ("", 0))[1] or 0
                     found[channel.topic] = ros2_type(channel.schema), before + counts.pop(channel.topic)
+                elif channel.encoding not in ("cdr", "ros1"):
+                    unread[channel.topic] = f"{channel.topic} ({channel.schema}, encoded as {channel.encoding})"
         self.topics = tuple(BagTopic(name, kind, count) for name, (kind, count) in found.items())
+        self.unread = tuple(unread.values())
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -221,7 +232,7 @@ class McapSource:
     def _typestore(self, channel: McapChannel) -> Typestore:
         key = channel.schema, channel.schema_encoding, channel.definition
         if key not in self._typestores:
-            self._typestores[key] = _typestore_of(channel)
+            self._typestores[key] = typestore_of(channel)
         return self._typestores[key]
 
 
@@ -229,25 +240,10 @@ def _file_of(path: Path) -> McapFile | Ros1File:
     return Ros1File(path) if _begins_with(path, ROS1_MAGIC) else McapFile(path)
 
 
-def _typestore_of(channel: McapChannel) -> Typestore:
-    """Types that the messages of a channel are made of."""
-    from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
-
-    if not channel.definition:
-        return get_typestore(Stores.ROS1_NOETIC if channel.encoding == "ros1" else Stores.ROS2_HUMBLE)
-    store = get_typestore(Stores.EMPTY)
-    if channel.schema_encoding in ("ros2idl", "omgidl"):
-        for part in channel.definition.split("=" * 80 + "\n"):
-            text = part.split("\n", 1)[1] if part.startswith("IDL: ") else part
-            if text.strip():
-                store.register(get_types_from_idl(text))
-    else:
-        store.register(get_types_from_msg(channel.definition, ros2_type(channel.schema)))
-    return store
-
-
 class RosbagsSource:
     """A ROS 1 bag, or a ROS 2 bag in sqlite3."""
+
+    unread: tuple[str, ...] = ()
 
     def __init__(self, path: Path) -> None:
         """Read what the bag says about its topics."""
@@ -323,53 +319,9 @@ def _plain(messages: Iterator[tuple[Any, Any, Any]]) -> Iterator[tuple[Any, int,
         yield connection, stamp, bytes(data)
 
 
-def ros2_types() -> Typestore:
-    """Types of ROS 2: between its messages and those of ROS 1, whose headers count themselves, they translate."""
-    from rosbags.typesys import Stores, get_typestore
-
-    return get_typestore(Stores.ROS2_HUMBLE)
-
-
-def learn_type(store: Typestore, kind: str, definition: str) -> None:
-    """Make a type known, and those in it that are not.
-
-    Parameters
-    ----------
-    store : takes it.
-    kind : its name: `commission_msgs/msg/Beams`.
-    definition : what it is, in the language of ROS messages.
-    """
-    from rosbags.typesys import get_types_from_msg
-
-    types = get_types_from_msg(definition, kind)
-    store.register({name: fields for name, fields in types.items() if name not in store.fielddefs})
-
-
 def _begins_with(path: Path, magic: bytes) -> bool:
     with path.open("rb") as file:
         return file.read(len(magic)) == magic
-
-
-def unpacked_message(data: bytes) -> bytes:
-    """Return a message of a bag whose messages are packed one by one (`compression_mode: MESSAGE`), or it as it is.
-
-    Encoded messages begin with a byte of 0: what begins as zstd does is none. Raises ValueError where it is damaged.
-    """
-    if not data.startswith(ZSTD_MAGIC):
-        return data
-    from rosbags.rosbag2.storage_mcap import zstd
-
-    try:
-        # A few bytes could unpack into gigabytes.
-        return zstd.ZstdDecompressor().decompress(data, max_length=RECORD_LIMIT)
-    except zstd.ZstdError as error:
-        raise ValueError(str(error)) from error
-
-
-def ros2_type(name: str) -> str:
-    """Name of a type as ROS 2 has it: `sensor_msgs/msg/LaserScan` of `sensor_msgs/LaserScan`."""
-    parts = name.split("/")
-    return f"{parts[0]}/msg/{parts[1]}" if len(parts) == 2 else name
 
 
 @contextmanager

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from commission.errors import CommissionError, FileFormatError
+from commission.io.interchange import ConvertOptions, convert_file
 from commission.io.recordings.base import load_log
 from commission.io.recordings.channels import ChannelOptions
+from commission.io.recordings.mcap_writer import McapWriter
 from commission.io.recordings.motion import Wheels
 from commission.site.record_log import RecordLog
 from commission.site.recorded_sweep import RecordedSweep
@@ -220,3 +222,96 @@ def test_packed_bag_that_is_cut_is_read_to_there_and_an_error_names_the_bag(tmp_
     noise.write_bytes(content[:4] + rng.bytes(500))
     with pytest.raises(FileFormatError, match=r"noise\.db3\.zstd: is packed as a whole"):
         load_log(noise)
+
+
+def simulated(zeros: int, count: int = 20) -> list[bags.Message]:
+    """A simulation that tells its time from 0 on, recorded by another clock; at first it stands."""
+    found: list[bags.Message] = []
+    for k in range(zeros + count):
+        stamp = max(k - zeros + 1, 0) * TENTH
+        for topic, kind, _, make in (bags.odometry(stamp, (0.1 * k, 0.0, 0.0)), bags.scan(stamp, ECHO)):
+            found.append((topic, kind, START + k * TENTH, make))
+    return found
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("zeros", [1, 5])
+def test_time_of_a_simulation_that_begins_at_zero_is_no_missing_stamp(tmp_path: Path, kind: str, zeros: int) -> None:
+    log = read(tmp_path, simulated(zeros), kind=kind)
+
+    assert log.odometry_stamps_ns.tolist() == [k * TENTH for k in range(21)]
+    assert log.scans[0].stamps_ns.tolist() == [k * TENTH for k in range(21)]
+    assert not any("no stamp" in note for note in log.notes)
+    # What it drove while its time stood is not lost.
+    np.testing.assert_allclose(log.displacements[:, 0].sum(), 2.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("count", [1, 63, 200])
+def test_scans_that_all_have_no_stamp_are_stamped_by_their_recording(tmp_path: Path, count: int) -> None:
+    messages = [(*bags.scan(0, ECHO)[:2], START + k * TENTH, bags.scan(0, ECHO)[3]) for k in range(count)]
+
+    log = read(tmp_path, messages)
+
+    assert log.scans[0].stamps_ns.tolist() == [START + k * TENTH for k in range(count)]
+    assert f"{count} messages of /scan have no stamp; the time of recording stands for it" in log.notes
+
+
+def test_a_stamp_that_is_missing_among_others_of_today_is_that_of_the_recording(tmp_path: Path) -> None:
+    messages = [bags.scan(START + k * TENTH, ECHO) for k in range(4)]
+    messages[0] = (*messages[0][:3], bags.scan(0, ECHO)[3])
+
+    log = read(tmp_path, messages)
+
+    assert log.scans[0].stamps_ns.tolist() == [START + k * TENTH for k in range(4)]
+    assert "1 messages of /scan have no stamp; the time of recording stands for it" in log.notes
+
+
+@pytest.mark.parametrize("also", ["other joints", "positions that are none", "speeds of the same wheels"])
+def test_wheels_are_told_by_those_messages_that_have_them(tmp_path: Path, also: str) -> None:
+    messages: list[bags.Message] = []
+    for k in range(5):
+        stamp = START + k * TENTH
+        # The wheels of 0.1 m turn by 2 rad between two messages: 0.2 m.
+        wheels = bags.joint_state(stamp, ["wl", "wr"], [2.0 * k, 2.0 * k], [20.0, 20.0])
+        if also == "other joints":
+            messages.append(bags.joint_state(stamp - 5, ["arm", "wl"], [], [0.3, 0.4]))
+        elif also == "positions that are none":
+            wheels = bags.joint_state(stamp, ["wl", "wr"], [math.nan, math.nan], [20.0, 20.0])
+        else:
+            messages.append(bags.joint_state(stamp + 5, ["wl", "wr"], [], [99.0, 99.0]))
+        messages.append(wheels)
+    path = bags.write_bag(tmp_path / "bag_mcap.mcap", sorted(messages, key=lambda each: each[2]))
+
+    log = load_log(path, ChannelOptions(wheels=Wheels(left="wl", right="wr", radius=0.1, separation=0.5)))
+
+    np.testing.assert_allclose(log.displacements, [[0.0, 0.0, 0.0], *4 * [[0.2, 0.0, 0.0]]], atol=1e-9)
+
+
+def test_topics_of_another_encoding_and_topics_without_a_message_are_named_as_such(tmp_path: Path) -> None:
+    other = tmp_path / "other.mcap"
+    with other.open("wb") as file:
+        writer = McapWriter(other, file)
+        writer.add_message(writer.add_channel("/scan", "foxglove.LaserScan", ""), START, b"{}")
+        writer.finish()
+    # Both have three letters, so that nothing moves.
+    other.write_bytes(other.read_bytes().replace(b"\x03\x00\x00\x00cdr", b"\x03\x00\x00\x00pb3"))
+    empty = tmp_path / "empty.mcap"
+    with empty.open("wb") as file:
+        writer = McapWriter(empty, file)
+        writer.add_channel("/scan", "sensor_msgs/msg/LaserScan", "")
+        writer.finish()
+
+    with pytest.raises(FileFormatError, match=r"is read \(it has /scan \(foxglove.LaserScan, encoded as pb3\)\)"):
+        load_log(other)
+    with pytest.raises(FileFormatError, match=r"is read \(it has /scan \(sensor_msgs/msg/LaserScan, no message\)\)"):
+        load_log(empty)
+
+
+@pytest.mark.parametrize("kind", [".mcap", ".db3"])
+def test_metadata_of_a_bag_stand_for_its_folder(tmp_path: Path, kind: str) -> None:
+    folder = bags.write_bag(tmp_path / f"bag_{kind[1:]}{kind}", scans())
+
+    assert_same(load_log(folder / "metadata.yaml").records(), load_log(folder).records())
+    convert_file(folder / "metadata.yaml", tmp_path / "tables", ConvertOptions())
+
+    assert len(load_log(tmp_path / "tables").scans[0]) == 4
