@@ -45,6 +45,8 @@ NEW_WAY = 1.0
 """Part of the way, see `way_between`, between two attempts at least."""
 TRIED = 16
 """Poses that pairs suggest and that are led along, those that most things fit."""
+ALIKE = 0.25
+"""Poses within that part of one place are led along once: they come to stand at the same place."""
 ODDS_AGAINST_NONE = 1e4
 """How much likelier it must be than that what is seen is none of the map's reflectors; than all others as `ODDS`
 says. With maps of other places a real robot reached 1e3 at most, in 48 minutes of driving."""
@@ -103,9 +105,11 @@ def explained_again(search: Search, belief: PoseGaussian | None, now_ns: int, ar
     poses = [*known, compose(found[: min(count, TRIED), :3], track)]
     if belief is not None:
         poses.append(np.array(((belief.x, belief.y, belief.theta),)))
-    explained = np.empty((sum(map(len, poses)), 12))
+    tried = np.concatenate(poses)
+    tried = tried[each_place_once(tried, len(tried), ALIKE)]
+    explained = np.empty((len(tried), 12))
     explain(
-        read_only(np.concatenate(poses)),
+        read_only(tried),
         search.trail,
         around.models,
         around.eyes,
