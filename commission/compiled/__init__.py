@@ -41,9 +41,14 @@ def compiled(kernel: Kernel) -> Kernel:
 def compiled_inline(kernel: Kernel) -> Kernel:
     """Like `compiled`, and always laid into the kernel that calls it: for steps of a few dozen operations.
 
-    A call hands over every scalar of a named tuple through memory and counts references of every array.
+    A call hands over every scalar of a named tuple through memory and counts references of every array. What lets
+    Python call each of them is left out, which would take a third of the time in which the filter compiles; called from
+    Python they are compiled for that as well, see `_InlineKernel`.
     """
-    return _kernel(kernel, forceinline=True)
+    step: Any = _kernel(kernel, forceinline=True, no_cpython_wrapper=True)
+    if step is not kernel:
+        step.__class__ = _InlineKernel
+    return step
 
 
 def compiled_parallel(kernel: Kernel) -> Kernel:
@@ -51,8 +56,19 @@ def compiled_parallel(kernel: Kernel) -> Kernel:
     return _kernel(kernel, parallel=True)
 
 
+class _InlineKernel(_numba.core.dispatcher.Dispatcher):
+    """A kernel that is laid into others; where Python calls it alone, as tests do, it is compiled for that as well."""
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        """Call it from Python."""
+        if "alone" not in vars(self):
+            self.alone = _kernel(self.py_func, forceinline=True)
+        return self.alone(*args, **kwargs)
+
+
 def _kernel(kernel: Kernel, **options: bool) -> Kernel:
-    dispatcher: Any = _numba.njit(nogil=True, error_model="numpy", **options)(kernel)
+    # No wrapper for C either: nobody calls a kernel from there.
+    dispatcher: Any = _numba.njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)(kernel)
     if dispatcher is not kernel:  # with NUMBA_DISABLE_JIT=1 it stays the Python function, to step through
         dispatcher._cache = KernelCache(dispatcher)
     return dispatcher
@@ -113,7 +129,8 @@ class KernelCache:
         config = _numba.core.config
         switches = (config.OPT, config.BOUNDSCHECK, config.DEBUGINFO_DEFAULT)
         fields = tuple(named_fields(kind) for argument in getattr(sig, "args", sig) for kind in _named_tuples(argument))
-        made_for = repr((self._digest, versions, switches, codegen.magic_tuple(), str(sig), fields))
+        options = sorted(self._dispatcher.targetoptions.items())
+        made_for = repr((self._digest, versions, switches, options, codegen.magic_tuple(), str(sig), fields))
         name = f"{function.__module__}.{function.__qualname__}".replace("<", "").replace(">", "")
         return f"{name[:150]}-{hashlib.sha256(made_for.encode()).hexdigest()[:32]}.kernel"
 

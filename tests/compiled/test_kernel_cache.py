@@ -72,6 +72,23 @@ def test_edit_compiles_what_depends_on_it_and_nothing_else(
     assert (outcome.values, outcome.compiled) == (expected, compiled)
 
 
+def test_step_of_another_kernel_has_no_entry_for_python_until_python_calls_it(tmp_path: Path) -> None:
+    script = """
+import json
+from commission import angles, steps
+found, alone = [steps.predict(steps.State(x=2.0, y=5.0))], []
+for call in (lambda: None, lambda: found.append(angles.wrap(5.0))):
+    call()
+    alone.append(hasattr(angles.wrap, "alone"))
+print(json.dumps({"values": found, "compiled": alone, "loaded": []}))
+"""
+    package = SmallPackage(tmp_path / "package")
+    # The second program finds both in the cache.
+    for _ in range(2):
+        outcome = package.run(tmp_path / "cache", script)
+        assert (outcome.values, outcome.compiled) == ([1.0, 1.0], [False, True])
+
+
 def test_kernel_on_all_cores_is_cached_too(tmp_path: Path) -> None:
     package, cache = SmallPackage(tmp_path / "package"), tmp_path / "cache"
     for compiled in (["doubled"], []):
