@@ -77,9 +77,13 @@ class CarmenLog(WholeRecording):
         self._cut: str | None = None
         counts: Counter[str] = Counter()
         stamps: Growing[np.float64] = Growing(np.float64, 2)
+        self._unstamped: int | None = None
+        """First line without both of its stamps: it ends early, or is none of CARMEN."""
         for line in self._lines():
             counts[line.kind] += 1
             stamps.append(np.array([line.stamps_s]))
+            if self._unstamped is None and not np.isfinite(line.stamps_s).any():
+                self._unstamped = line.number
         self._chosen = [next((kind for kind in kinds if counts[kind]), None) for kinds in (_FRONT, _REAR)]
         if not counts:
             raise FileFormatError(path, "", "has no message that is read", f"one of: {', '.join(_KNOWN)}")
@@ -141,8 +145,12 @@ class CarmenLog(WholeRecording):
             if len(stamps_s) == 1 and np.isfinite(stamps_s).any():
                 first = float(stamps_s[np.isfinite(stamps_s)][0])
                 return np.array([round(first * 1e9)]), []
-            found = "has one stamp in all its lines" if np.isfinite(stamps_s).all() else "has lines without a stamp"
-            raise FileFormatError(self.path, "", found, "times at the end of each line [s]")
+            has_all = bool(np.isfinite(stamps_s).all())
+            where = "" if self._unstamped is None else f"line {self._unstamped}"
+            found = (
+                "has one stamp in all its lines" if has_all else "has no stamp" if where else "has lines without one"
+            )
+            raise FileFormatError(self.path, where, found, "times at the end of each line [s]")
         # Sent comes before written: the writer is late by the network. A clock of few steps is none.
         steps = [len(np.unique(column)) if good else 0 for (column, _), good in zip(columns, usable, strict=True)]
         chosen = 0 if steps[0] * 2 >= steps[1] else 1

@@ -31,6 +31,7 @@ from commission.site.records import Scan
 PATIENCE = 64
 """Scans of one scanner that may come before an earlier one: 2.5 s at 25 a second."""
 
+_TOO_LATE = "have intensities, and the first ones have none: they are left out"
 SET_BACK_NS = 5_000_000_000
 """Way back of stamps from which it is a clock that was set, and no message that came late [ns]."""
 
@@ -266,7 +267,7 @@ class _ScanQueue:
         """By how much a stamp lay before a former one, at most [ns]."""
         self._newest: int | None = None
         self._last: int | None = None
-        self._first: Scan | None = None
+        self._has_intensities = self._has_reflector = False
 
     def add(self, scan: Scan) -> None:
         if self._newest is not None and scan.stamp_ns < self._newest:
@@ -294,18 +295,22 @@ class _ScanQueue:
         if not 0 < len(scan.ranges):
             self._told["scans without a beam are left out"] += 1
             return
-        self._first = self._first or scan
+        if self._last is None:
+            # A driver may begin with a scan that lacks what all others have.
+            first = [scan, *(each for _, _, each in self._waiting)]
+            self._has_intensities = any(each.intensities is not None for each in first)
+            self._has_reflector = any(each.reflector is not None for each in first)
         self._last = scan.stamp_ns
-        self._writer.add(self._alike(scan, self._first))
+        self._writer.add(self._alike(scan))
 
-    def _alike(self, scan: Scan, first: Scan) -> Scan:
-        """Return a scan with the arrays of the first one."""
-        if (scan.intensities is None) != (first.intensities is None):
-            self._told["scans have intensities where others have none (taken as 0)"] += 1
-            scan = replace(
-                scan, intensities=None if first.intensities is None else np.zeros(len(scan.ranges), np.float32)
-            )
-        if (scan.reflector is None) != (first.reflector is None):
+    def _alike(self, scan: Scan) -> Scan:
+        """Return a scan with the arrays that the first ones have."""
+        if (scan.intensities is not None) != self._has_intensities:
+            fate = "have no intensities, where others do (taken as 0)" if self._has_intensities else _TOO_LATE
+            self._told[f"scans {fate}"] += 1
+            filled = np.zeros(len(scan.ranges), np.float32) if self._has_intensities else None
+            scan = replace(scan, intensities=filled)
+        if (scan.reflector is not None) != self._has_reflector:
             self._told["scans have reflector flags where others have none (taken as none)"] += 1
-            scan = replace(scan, reflector=None if first.reflector is None else np.zeros(len(scan.ranges), np.bool_))
+            scan = replace(scan, reflector=np.zeros(len(scan.ranges), np.bool_) if self._has_reflector else None)
         return scan

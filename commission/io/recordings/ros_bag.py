@@ -39,8 +39,10 @@ class RosBag(WholeRecording):
         self._bag = open_bag(path)
         found = [each for t in self._bag.topics for each in ros.topic_of(t.name, t.type, t.count)]
         unasked = [topic for topic in found if ros.is_taken_unasked(topic)]
-        named = {word.partition("=")[2] for word in options.channels}
-        self.chosen = choose(path, unasked + [topic for topic in found if topic.name in named], options)
+        # Named as odometry, a topic is not the reference as well.
+        named = {(word.partition("=")[0].partition(".")[0], word.partition("=")[2]) for word in options.channels}
+        asked = [topic for topic in found if topic not in unasked and (topic.role, topic.name) in named]
+        self.chosen = choose(path, unasked + asked, options)
         self._far = [topic for topic in found if topic not in unasked]
         if self.chosen.odometry is None and not any(word.startswith(Role.ODOMETRY) for word in options.channels):
             self.chosen = replace(self.chosen, odometry=self._moving_transforms())

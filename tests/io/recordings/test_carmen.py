@@ -119,6 +119,13 @@ def test_message_that_ends_early_is_told_with_its_line(tmp_path: Path) -> None:
         load_log(path)
 
 
+def test_message_that_ends_before_its_stamp_is_told_with_its_line(tmp_path: Path) -> None:
+    path = log_of(tmp_path, odometry(0.0, 5.0, 5.0), "FLASER 180 1.0 2.0", odometry(1.0, 7.0, 7.0))
+
+    with pytest.raises(FileFormatError, match="line 4: has no stamp; expected times at the end of each line"):
+        load_log(path)
+
+
 WORDS = st.sampled_from(
     [
         "FLASER",

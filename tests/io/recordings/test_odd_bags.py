@@ -315,3 +315,32 @@ def test_metadata_of_a_bag_stand_for_its_folder(tmp_path: Path, kind: str) -> No
     convert_file(folder / "metadata.yaml", tmp_path / "tables", ConvertOptions())
 
     assert len(load_log(tmp_path / "tables").scans[0]) == 4
+
+
+@pytest.mark.parametrize("name", ["/odom", "/odometry/filtered"])
+def test_odometry_that_is_named_is_not_its_own_reference(tmp_path: Path, name: str) -> None:
+    topics = "/odom", "/odometry/filtered"
+    both = [bags.odometry(START + k, (0.1 * k, 0.0, 0.0), topic=topic) for k in range(4) for topic in topics]
+
+    log = read(tmp_path, [*both, *scans()], f"odometry={name}")
+
+    assert len(log.odometry_stamps_ns) == 4
+    assert len(log.reference_stamps_ns) == 0
+    other = {"/odom": "/odometry/filtered", "/odometry/filtered": "/odom"}[name]
+    held = load_log(tmp_path / "bag_mcap", ChannelOptions(channels=(f"odometry={name}", f"reference={other}")))
+    assert held.reference_poses[:, 0].tolist() == pytest.approx([0.0, 0.1, 0.2, 0.3])
+
+
+@pytest.mark.parametrize("first_without", [1, 30])
+def test_intensities_are_kept_where_the_first_scans_have_none(tmp_path: Path, first_without: int) -> None:
+    messages = [
+        bags.scan(START + k * TENTH, ECHO, intensities=STRONG if k >= first_without else None) for k in range(100)
+    ]
+
+    log = read(tmp_path, messages)
+
+    strengths = log.scans[0].block(0, 100).intensities
+    assert strengths is not None
+    assert strengths[first_without:].tolist() == [STRONG] * (100 - first_without)
+    assert not strengths[:first_without].any()
+    assert f"{first_without} scans have no intensities, where others do (taken as 0)" in log.notes
