@@ -12,10 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from commission.geometry.arrays import FloatArray
-from commission.localization.estimate import Mode, Status
+from commission.localization.estimate import Status
 from commission.localization.setup import LocalizerSetup
-from commission.site.quantity import FARTHEST, MILLIMETRES
+from commission.site.quantity import MILLIMETRES
 from commission.studies.heaps import heaps_of, middle_of
+from commission.studies.map_shape import sightings
 from commission.studies.map_shape_told import shape_of_map, told_of
 from commission.studies.plausibility import Finding
 from commission.studies.reflector_figures import ReflectorFigures, ReflectorFiguresInput, reflector_figures
@@ -34,8 +35,6 @@ FEWEST, FEWEST_EXPECTED = 50, 50
 """Detections of a thing, and scans that should see a reflector, below which nothing is said."""
 SEEN_SHARE, THING_SHARE = 0.02, 0.3
 """It is seen at its place in at most, and the thing in at least, such a part of the scans that should see it [0..1]."""
-MOST_DETECTIONS = 200_000
-"""Detections that are looked at, evenly over the drive."""
 
 
 class _Displaced(NamedTuple):
@@ -68,18 +67,12 @@ def misplaced_findings(result: RunResult, figures: ReflectorFigures | None = Non
 def _beside(result: RunResult, setup: LocalizerSetup) -> Iterator[_Displaced]:
     """Things of which the nearest reflector is seen nowhere, each reflector once."""
     columns, centers = result.columns, setup.reflectors.centers
-    step = max(1, len(columns.status) // MOST_DETECTIONS)
-    rows = np.arange(0, len(columns.status), step)
-    cycle = np.repeat(np.arange(len(columns)), np.diff(columns.offsets))[rows]
-    known = np.isin(columns.modes, (Mode.OPERATIONAL, Mode.FAIL))[cycle]
-    accepted = np.bincount(columns.reflector[columns.status == Status.INLIER] + 1, minlength=len(centers) + 1)[1:]
-    lonely = np.flatnonzero(accepted == 0)
-    strange = rows[known & (columns.status[rows] == Status.OUTLIER_ASSOCIATION)]
-    if not len(lonely) or len(strange) * step < FEWEST:
-        return
-    places = columns.points_map()[strange]
-    places = places[(np.abs(places) <= FARTHEST).all(axis=1)]
-    if not len(places):
+    looked = sightings(columns, setup)
+    status, reflector = columns.status[looked.rows], columns.reflector[looked.rows]
+    accepted = reflector[(status == Status.INLIER) & (reflector >= 0)]
+    lonely = np.flatnonzero(np.bincount(accepted, minlength=len(centers)) == 0)
+    places, step = looked.places[status == Status.OUTLIER_ASSOCIATION], looked.every
+    if not len(lonely) or not len(places):
         return
     left = lonely.tolist()
     for heap in heaps_of(places, CELL_M):
@@ -96,6 +89,8 @@ def _beside(result: RunResult, setup: LocalizerSetup) -> Iterator[_Displaced]:
 def _is_missed(each: _Displaced, figures: ReflectorFigures) -> bool:
     """Whether scans that should see a reflector see something beside it instead."""
     expected, apart = int(figures.expected[each.reflector]), float(np.hypot(*each.off))
+    if figures.accepted[each.reflector]:
+        return False
     if expected < FEWEST_EXPECTED:
         # The map has it behind a wall: it may stand there, out of sight, unless the thing is close by.
         return apart < HIDDEN_M

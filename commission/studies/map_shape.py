@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -131,18 +132,40 @@ def map_shape(columns: RunColumns, setup: LocalizerSetup) -> MapShape:
     return MapShape(judged=tuple(judged.tolist()), wrong=wrong, off=read_only(off), scans=len(np.unique(seen.cycle)))
 
 
-def _seen(columns: RunColumns, setup: LocalizerSetup) -> _Seen:
-    """Detections that are of a reflector: accepted, or near one that hardly anything else is near of."""
-    cycles = np.arange(0, len(columns), max(1, -(-len(columns) // MOST_SCANS)))
+class DriveSightings(NamedTuple):
+    """Detections that passed the detector while the vehicle knew where it was, of some cycles evenly over a drive."""
+
+    every: int
+    """One of so many cycles is looked at."""
+    rows: IntArray
+    """(n,) rows of the run."""
+    cycle: IntArray
+    """(n,) cycle of each."""
+    sensor: FloatArray
+    """(n, 3) pose of the scanner [m, m, rad], map frame."""
+    measured: FloatArray
+    """(n, 2) range [m] and bearing [rad], scanner frame, without the range bias that is known."""
+    places: FloatArray
+    """(n, 2) where each lies [m], map frame."""
+
+
+def sightings(columns: RunColumns, setup: LocalizerSetup) -> DriveSightings:
+    """Look at a drive's detections: of hours of it, at so many that they need little memory.
+
+    Parameters
+    ----------
+    columns : a run with this setup alone.
+    setup : its scanners.
+    """
+    every = max(1, -(-len(columns) // MOST_SCANS))
+    cycles = np.arange(0, len(columns), every)
     modes = columns.modes[cycles]
     cycles = cycles[(modes == Mode.OPERATIONAL) | (modes == Mode.FAIL)]
     counts = columns.offsets[cycles + 1] - columns.offsets[cycles]
     cycle = np.repeat(cycles, counts)
-    firsts = np.cumsum(counts) - counts
-    rows = np.arange(counts.sum()) - np.repeat(firsts - columns.offsets[cycles], counts)
-    status = columns.status[rows]
-    passed = status != Status.OUTLIER_DETECTOR
-    rows, cycle, status = rows[passed], cycle[passed], status[passed]
+    rows = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts - columns.offsets[cycles], counts)
+    passed = columns.status[rows] != Status.OUTLIER_DETECTOR
+    rows, cycle = rows[passed], cycle[passed]
     mountings = np.array([each.mounting for each in setup.scanners])
     sensor = se2.compose(columns.means[cycle], mountings[columns.detected.scanners[cycle]])
     measured = columns.range_bearing[rows] - (setup.parameters.observation.range_bias, 0.0)
@@ -150,8 +173,15 @@ def _seen(columns: RunColumns, setup: LocalizerSetup) -> _Seen:
     places = sensor[:, :2] + measured[:, :1] * np.stack((np.cos(direction), np.sin(direction)), axis=1)
     # An estimate that has run away sees nothing that can be looked up.
     on_floor = (np.abs(places) <= FARTHEST).all(axis=1)
-    rows, cycle, status = rows[on_floor], cycle[on_floor], status[on_floor]
-    sensor, measured, places = sensor[on_floor], measured[on_floor], places[on_floor]
+    return DriveSightings(
+        every, rows[on_floor], cycle[on_floor], sensor[on_floor], measured[on_floor], places[on_floor]
+    )
+
+
+def _seen(columns: RunColumns, setup: LocalizerSetup) -> _Seen:
+    """Detections that are of a reflector: accepted, or near one that hardly anything else is near of."""
+    _, rows, cycle, sensor, measured, places = sightings(columns, setup)
+    status = columns.status[rows]
     centers = setup.reflectors.centers
     apart, nearest = KDTree(centers).query(places) if len(rows) else (np.empty(0), np.empty(0, dtype=np.int64))
     # Where several poses are kept, what is accepted may be of more than one reflector.
@@ -232,9 +262,10 @@ def _rank(matrix: FloatArray) -> int:
 
 def _views(columns: RunColumns, seen: _Seen) -> Iterator[_Seen]:
     """Detections of each stretch of the way; of each scanner apart."""
-    moved = np.diff(columns.means, axis=0)
+    cycles = np.unique(seen.cycle)
+    moved = np.diff(columns.means[cycles], axis=0)
     way = np.hypot(moved[:, 0], moved[:, 1]) / VIEW_M + np.abs(wrap(moved[:, 2])) / VIEW_RAD
-    view = np.append(0.0, np.floor(np.cumsum(way)))[seen.cycle]
+    view = np.append(0.0, np.floor(np.cumsum(way)))[np.searchsorted(cycles, seen.cycle)]
     order = np.lexsort((seen.cycle, columns.detected.scanners[seen.cycle], view))
     keys = np.stack((view[order], columns.detected.scanners[seen.cycle][order]), axis=1)
     for rows in np.split(order, np.flatnonzero((np.diff(keys, axis=0) != 0).any(axis=1)) + 1):

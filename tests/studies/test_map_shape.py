@@ -181,3 +181,13 @@ def test_a_thing_beside_a_reflector_that_is_seen_is_none_that_was_moved() -> Non
     log, project = drive(), PROJECT
     more = replace(project.reflectors.reflectors[2], id="S", x=project.reflectors.reflectors[2].x + 0.8)
     assert findings_of(replace(project, reflectors=ReflectorMap((*project.reflectors.reflectors, more))), log) == ()
+
+
+def test_of_hours_some_cycles_tell_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("commission.studies.map_shape.MOST_SCANS", 150)
+    by_little, by_much = (with_moved(PROJECT, {"R5": move}) for move in ((0.1, 0.0), (0.7, 0.0)))
+    (finding,) = findings_of(by_little, drive())
+    assert finding.found.startswith(f"1 of 7 reflectors {WORDS}, by 150 scans that see several of them: R5 by ")
+    (finding,) = findings_of(by_much, drive())
+    assert finding.found.startswith("R5 is seen nowhere at its place, in ")
+    assert findings_of(PROJECT, drive()) == ()
