@@ -45,7 +45,7 @@ from commission.localization.rejection import (
 )
 from commission.localization.rival_poses import RivalPoses
 from commission.localization.setup import FilterModel
-from commission.localization.state import FilterState
+from commission.localization.state import Tracking
 from commission.localization.zones import ZoneRows, kinds_at
 
 
@@ -67,7 +67,7 @@ class Reflexes(NamedTuple):
 
 @compiled
 def process_reflex(  # noqa: PLR0917 - a reflex and all that it is looked at with
-    state: FilterState,
+    state: Tracking,
     stamp_ns: int,
     following: NextOdometry,
     row: int,

@@ -51,7 +51,7 @@ from commission.localization.scan_association import associate_by, prepare, with
 from commission.localization.scan_rows import ScanRows
 from commission.localization.setup import FilterModel
 from commission.localization.several_scans import is_contested, keep_own
-from commission.localization.state import FilterState
+from commission.localization.state import Tracking
 from commission.localization.supervisor import FAIL, LOST, OPERATIONAL, supervise
 from commission.localization.temporary import TemporaryModel, observe_temporary
 from commission.localization.temporary_memory import TemporaryMemory
@@ -67,13 +67,13 @@ class Cycle(NamedTuple):
     """State after a scan, and the belief just before its detections were used."""
 
     prior: PoseGaussian
-    state: FilterState
+    state: Tracking
 
 
 @compiled_inline
 def process_odometry(  # noqa: PLR0917 - one odometry record, number by number
-    state: FilterState, stamp_ns: int, dx: float, dy: float, dtheta: float, noise: OdometryNoise
-) -> FilterState:
+    state: Tracking, stamp_ns: int, dx: float, dy: float, dtheta: float, noise: OdometryNoise
+) -> Tracking:
     """Predict over the motion of an odometry record: `advance`, in the filter's state.
 
     Parameters
@@ -84,7 +84,7 @@ def process_odometry(  # noqa: PLR0917 - one odometry record, number by number
     noise : variances per metre, radian and second.
     """
     belief, motion = advance(state.belief, state.motion, stamp_ns, dx, dy, dtheta, noise)
-    return FilterState(
+    return Tracking(
         belief,
         stamp_ns,
         motion,
@@ -93,14 +93,7 @@ def process_odometry(  # noqa: PLR0917 - one odometry record, number by number
         state.output,
         state.output_ns,
         stamp_ns,
-        state.sensor_detects,
         state.pivot,
-        state.cross,
-        state.search,
-        state.protection,
-        state.temporary,
-        state.rivals,
-        state.lasting,
         state.walls,
     )
 
@@ -127,7 +120,7 @@ class TemporaryLook(NamedTuple):
 
 @compiled_inline
 def process_scan(  # noqa: PLR0917 - a scan and all that it is looked at with
-    state: FilterState,
+    state: Tracking,
     stamp_ns: int,
     following: NextOdometry,
     scanner: int,
@@ -193,7 +186,7 @@ def process_scan(  # noqa: PLR0917 - a scan and all that it is looked at with
 
 
 @compiled_inline
-def held_back(rivals: RivalPoses | None, before: FilterState, after: FilterState, model: FilterModel) -> FilterState:
+def held_back(rivals: RivalPoses | None, before: Tracking, after: Tracking, model: FilterModel) -> Tracking:
     """State after a cycle, not operational where the vehicle may as well stand elsewhere.
 
     Parameters
@@ -215,7 +208,7 @@ def held_back(rivals: RivalPoses | None, before: FilterState, after: FilterState
 
 @compiled_inline
 def supervised(  # noqa: PLR0917 - what a cycle has found, value by value
-    before: FilterState,
+    before: Tracking,
     stamp_ns: int,
     posterior: PoseGaussian,
     motion: Motion,
@@ -223,7 +216,7 @@ def supervised(  # noqa: PLR0917 - what a cycle has found, value by value
     pivot: tuple[float, float],
     walls: WallDepth,
     model: FilterModel,
-) -> FilterState:
+) -> Tracking:
     """State after a cycle, whatever kind of observation it was.
 
     Parameters
@@ -250,29 +243,11 @@ def supervised(  # noqa: PLR0917 - what a cycle has found, value by value
     output, output_ns = before.output, before.output_ns
     if mode == OPERATIONAL:
         output, output_ns = posterior, stamp_ns
-    return FilterState(
-        posterior,
-        stamp_ns,
-        motion,
-        mode,
-        evidence,
-        output,
-        output_ns,
-        stamp_ns,
-        before.sensor_detects,
-        pivot,
-        before.cross,
-        before.search,
-        before.protection,
-        before.temporary,
-        before.rivals,
-        before.lasting,
-        walls,
-    )
+    return Tracking(posterior, stamp_ns, motion, mode, evidence, output, output_ns, stamp_ns, pivot, walls)
 
 
 @compiled_inline
-def with_mode(before: FilterState, after: FilterState, mode: int) -> FilterState:
+def with_mode(before: Tracking, after: Tracking, mode: int) -> Tracking:
     """State after a cycle whose mode is another one: what the vehicle is given goes along with it.
 
     Parameters
@@ -287,7 +262,7 @@ def with_mode(before: FilterState, after: FilterState, mode: int) -> FilterState
     """
     output = after.belief if mode == OPERATIONAL else before.output
     output_ns = after.belief_ns if mode == OPERATIONAL else before.output_ns
-    return FilterState(
+    return Tracking(
         after.belief,
         after.belief_ns,
         after.motion,
@@ -296,14 +271,7 @@ def with_mode(before: FilterState, after: FilterState, mode: int) -> FilterState
         output,
         output_ns,
         after.newest_ns,
-        after.sensor_detects,
         after.pivot,
-        after.cross,
-        after.search,
-        after.protection,
-        after.temporary,
-        after.rivals,
-        after.lasting,
         after.walls,
     )
 
@@ -341,7 +309,7 @@ def spread_where_lost(belief: PoseGaussian, seconds: float) -> PoseGaussian:
 def with_contours(  # noqa: PLR0917 - the filter's state around one scan
     belief: PoseGaussian,
     look: ContourLook | None,
-    before: FilterState,
+    before: Tracking,
     stamp_ns: int,
     motion: Motion,
     following: NextOdometry,
@@ -395,7 +363,7 @@ def with_temporary(  # noqa: PLR0917 - the filter's state around one scan
     prior: PoseGaussian,
     belief: PoseGaussian,
     look: TemporaryLook | None,
-    before: FilterState,
+    before: Tracking,
     motion: Motion,
     following: NextOdometry,
     stamp_ns: int,

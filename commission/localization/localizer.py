@@ -32,7 +32,7 @@ from commission.localization.estimate import Belief, Estimate, Mode, SeenBearing
 from commission.localization.lasting import lasting_innovations, mean_rows
 from commission.localization.observation import project_detections
 from commission.localization.odometry import NOT_YET, NextOdometry, waits_until
-from commission.localization.pose_gaussian import to_belief
+from commission.localization.pose_gaussian import PoseGaussian, to_belief
 from commission.localization.protected_cycle import ProtectionRoom, supervised_by_level
 from commission.localization.protection_state import bank_of, protection_state
 from commission.localization.relocalization import (
@@ -48,7 +48,7 @@ from commission.localization.scan_rows import ScanRows
 from commission.localization.search_map import SearchMap, search_map
 from commission.localization.seen_of_late import SeenScan
 from commission.localization.setup import LocalizerSetup
-from commission.localization.state import FilterState, belief_of, for_kernels, output_of, state_at_start
+from commission.localization.state import FilterState, Tracking, belief_of, output_of, state_at_start
 from commission.localization.sweep import Sweep, bring_to_stamp
 from commission.localization.tag_cycle import TagFrames, process_tags
 from commission.localization.tag_start import told_by_tags
@@ -124,7 +124,7 @@ class Localizer:
     def __init__(self, setup: LocalizerSetup, start: Belief | FilterState) -> None:
         self._setup = setup
         self._state = state_at_start(start) if isinstance(start, Belief) else start
-        self._newest_ns = self._horizon_ns = self._state.newest_ns
+        self._newest_ns = self._horizon_ns = self._state.tracking.newest_ns
         self._waiting: deque[Record] = deque()
         self._map: SearchMap | None = None
 
@@ -154,7 +154,7 @@ class Localizer:
     @property
     def mode(self) -> Mode:
         """State of the supervisor after the newest scan."""
-        return Mode(self._state.mode)
+        return Mode(self._state.tracking.mode)
 
     def replace_setup(self, setup: LocalizerSetup) -> None:
         """Use other parameters (or another map) for what is processed from now on; the state stays."""
@@ -221,7 +221,7 @@ class Localizer:
 
     def _following(self, stamp_ns: int) -> NextOdometry | None:
         """Odometry that follows the first scan that waits; None while it may still come in time."""
-        until_ns = waits_until(self._state.motion, stamp_ns)
+        until_ns = waits_until(self._state.tracking.motion, stamp_ns)
         for record in self._waiting:
             if isinstance(record, Odometry):
                 if record.stamp_ns > until_ns:
@@ -232,7 +232,8 @@ class Localizer:
 
     def _taken_in(self, record: Record, following: NextOdometry) -> Estimate | None:
         """Process one record."""
-        self._state = self._state._replace(newest_ns=int(record.stamp_ns))
+        tracking = self._state.tracking._replace(newest_ns=int(record.stamp_ns))
+        self._state = self._state._replace(tracking=tracking)
         match record:
             case Odometry():
                 self._advance(record)
@@ -270,10 +271,8 @@ class Localizer:
         if state.search is not None:
             self._state = searching_odometry(state, record.stamp_ns, (dx, dy, dtheta), noise)
             return
-        bare = for_kernels(state)
-        moved = process_odometry(bare, record.stamp_ns, dx, dy, dtheta, noise)
-        kept = {"cross": state.cross, "protection": state.protection, "temporary": state.temporary}
-        self._state = moved._replace(**kept, rivals=state.rivals, lasting=state.lasting)
+        moved = process_odometry(state.tracking, record.stamp_ns, dx, dy, dtheta, noise)
+        self._state = state._replace(tracking=moved)
 
     def _at_stamp(self, scanner: int, measured: FloatArray, following: NextOdometry) -> FloatArray:
         """Return the detections of a scan at its stamp, upright: what was measured, where there is no other."""
@@ -281,7 +280,7 @@ class Localizer:
         if not len(sweeps):
             return measured
         settled, sweep, model = np.empty(measured.shape), Sweep(*sweeps[scanner].tolist()), setup.observations[scanner]
-        bring_to_stamp(self._state.motion, following, 0, len(measured), measured, sweep, model, settled)
+        bring_to_stamp(self._state.tracking.motion, following, 0, len(measured), measured, sweep, model, settled)
         return read_only(settled)
 
     def _process(
@@ -301,20 +300,21 @@ class Localizer:
         goods = None if self._setup.temporary is None else np.zeros(TEMPORARY_COLUMNS)
         tags, met = self._seen_tags(scan), self._seen_bearing(scan)
         levels = None if self._setup.protection is None else np.full(2, math.inf)
-        if before.mode == Mode.INITIALIZING:
+        is_located = before.tracking.mode != Mode.INITIALIZING
+        if not is_located:
             associate_nothing(status, reflector, d2)
-            cycle = unlocated(before, stamp_ns, following, self._setup.filter.odometry)
+            prior, after = unlocated(before, stamp_ns, following, self._setup.filter.odometry)
         elif isinstance(scan, TagSightings) and tags is not None and tags.figures is not None:
-            cycle = self._tagged(scan, following, tags.figures, goods)
+            prior, after = self._tagged(scan, following, tags.figures, goods)
         elif isinstance(scan, Reflex) and met is not None and met.figures is not None:
-            cycle = self._met(scan, following, met.figures, goods)
+            prior, after = self._met(scan, following, met.figures, goods)
         else:
-            cycle = self._filtered(scan, rows, following, figures, goods)
-        if levels is not None and before.mode != Mode.INITIALIZING:
-            cycle = Cycle(cycle.prior, self._by_level(before, cycle, scanner, rows, levels))
-        self._state = cycle.state
+            prior, after = self._filtered(scan, rows, following, figures, goods)
+        if levels is not None and is_located:
+            after = self._by_level(before, prior, after, scanner, rows, levels)
+        self._state = after
         if not is_sought(before, self._setup.filter.limits):
-            self._state = cycle.state._replace(search=None)
+            self._state = after._replace(search=None)
         if is_sought(before, self._setup.filter.limits) or is_sought(self._state, self._setup.filter.limits):
             scan_seen = SeenScan(
                 stamp_ns=stamp_ns,
@@ -326,7 +326,7 @@ class Localizer:
                 upside_down=self._setup.scanners[scanner].upside_down,
                 following=following,
             )
-            self._state = self._sought(before, cycle.state, scan_seen, tags)
+            self._state = self._sought(before, after, scan_seen, tags)
         posterior = belief_of(self._state)
         offsets = np.array((0, count), dtype=np.int64)
         scanners = np.array((scanner,), dtype=np.int64)
@@ -335,7 +335,7 @@ class Localizer:
         )
         return Estimate(
             stamp_ns=stamp_ns,
-            prior=to_belief(cycle.prior, stamp_ns),
+            prior=to_belief(prior, stamp_ns),
             posterior=posterior,
             output=output_of(self._state),
             mode=self.mode,
@@ -356,18 +356,23 @@ class Localizer:
             levels=levels,
         )
 
-    def _by_level(
-        self, before: FilterState, cycle: Cycle, scanner: int, rows: ScanRows, levels: FloatArray
+    def _by_level(  # noqa: PLR0917 - a cycle and what became of it
+        self,
+        before: FilterState,
+        prior: PoseGaussian,
+        after: FilterState,
+        scanner: int,
+        rows: ScanRows,
+        levels: FloatArray,
     ) -> FilterState:
         """Let the supervisor go by the protection level, which is written."""
-        setup, after = self._setup, cycle.state
+        setup = self._setup
         bank = bank_of(before.protection, setup.protected_names)
         if setup.protection is None or bank is None:
             raise ValueError("protection levels are asked for where the supervisor goes by 2-sigma")
-        bare = for_kernels(after)
-        state = supervised_by_level(
-            for_kernels(before),
-            Cycle(cycle.prior, bare),
+        tracking = supervised_by_level(
+            before.tracking,
+            Cycle(prior, after.tracking),
             rows,
             setup.observations[scanner],
             setup.filter,
@@ -376,9 +381,7 @@ class Localizer:
             setup.zone_rows,
             poses_of(after.rivals, wanted=setup.decides_over_scans),
         )
-        protection = protection_state(bank, setup.protected_names)
-        kept = {"cross": after.cross, "search": after.search, "temporary": after.temporary}
-        return state._replace(**kept, protection=protection, rivals=after.rivals, lasting=after.lasting)
+        return after._replace(tracking=tracking, protection=protection_state(bank, setup.protected_names))
 
     def _seen_bearing(self, record: Scan | Detections | TagSightings | Reflex) -> SeenBearing | None:
         """What a reflex told, with room for what becomes of it where bearings are looked at; None of a scan."""
@@ -387,7 +390,9 @@ class Localizer:
         figures = None if self._setup.bearing_model is None else np.zeros(BEARING_COLUMNS)
         return SeenBearing(record.bearing, record.reflector, figures)
 
-    def _met(self, reflex: Reflex, following: NextOdometry, figures: FloatArray, goods: FloatArray | None) -> Cycle:
+    def _met(
+        self, reflex: Reflex, following: NextOdometry, figures: FloatArray, goods: FloatArray | None
+    ) -> tuple[PoseGaussian, FilterState]:
         """Let the filter process a reflex; what becomes of it is written."""
         setup, memory, rivals = self._setup, self._memory(), self._rivals()
         cross = columns_of(self._state.cross, setup.constants)
@@ -403,7 +408,7 @@ class Localizer:
             mean_rows(self._state.lasting, names),
         )
         cycle = process_reflex(
-            for_kernels(self._state),
+            self._state.tracking,
             reflex.stamp_ns,
             following,
             0,
@@ -417,7 +422,7 @@ class Localizer:
             rivals,
         )
         after = self._with_arrays(cycle.state, cross, memory, rivals)
-        return Cycle(cycle.prior, after._replace(lasting=lasting_innovations(reflexes.lasting, names)))
+        return cycle.prior, after._replace(lasting=lasting_innovations(reflexes.lasting, names))
 
     def _seen_tags(self, record: Scan | Detections | TagSightings | Reflex) -> SeenTags | None:
         """What a frame saw of tags, with room for what becomes of it where they are looked at; None of a scan."""
@@ -439,7 +444,7 @@ class Localizer:
 
     def _tagged(
         self, frame: TagSightings, following: NextOdometry, figures: FloatArray, goods: FloatArray | None
-    ) -> Cycle:
+    ) -> tuple[PoseGaussian, FilterState]:
         """Let the filter process a frame with tags; what becomes of them is written."""
         setup, constants, count = self._setup, self._setup.constants, len(frame.ids)
         cross = columns_of(self._state.cross, constants)
@@ -449,7 +454,7 @@ class Localizer:
         if setup.tag_model is None:
             raise ValueError("a frame with tags is processed where none are looked at; expected tags in the setup")
         cycle = process_tags(
-            for_kernels(self._state),
+            self._state.tracking,
             frame.stamp_ns,
             following,
             0,
@@ -462,7 +467,7 @@ class Localizer:
             self._temporary_look(None, 0, memory, goods),
             rivals,
         )
-        return Cycle(cycle.prior, self._with_arrays(cycle.state, cross, memory, rivals))
+        return cycle.prior, self._with_arrays(cycle.state, cross, memory, rivals)
 
     def _memory(self) -> TemporaryMemory | None:
         """Temporary landmarks as arrays to be written; None where they are not looked at."""
@@ -475,18 +480,18 @@ class Localizer:
 
     def _with_arrays(
         self,
-        state: FilterState,
+        tracking: Tracking,
         cross: FloatArray | None,
         memory: TemporaryMemory | None,
         rivals: RivalPoses | None,
     ) -> FilterState:
-        """Put what a cycle has left in its arrays into the state, and the search that went on beside it."""
-        return state._replace(
+        """Put what a cycle has left, also in its arrays, into the state."""
+        return self._state._replace(
+            tracking=tracking,
             cross=cross_covariance(cross, self._setup.constants),
-            search=self._state.search,
+            protection=None,
             temporary=self._state.temporary if memory is None else landmarks_in(memory),
             rivals=kept_poses(rivals),
-            lasting=self._state.lasting,
         )
 
     def _contour_look(self, scan: Scan | None, scanner: int, figures: FloatArray | None) -> ContourLook | None:
@@ -510,14 +515,14 @@ class Localizer:
         following: NextOdometry,
         figures: FloatArray | None,
         goods: FloatArray | None,
-    ) -> Cycle:
+    ) -> tuple[PoseGaussian, FilterState]:
         """Let the filter process a scan; what becomes of its detections, contours and goods is written."""
         setup, scan = self._setup, record if isinstance(record, Scan) else None
         scanner = 0 if isinstance(record, TagSightings | Reflex) else record.scanner
         cross = columns_of(self._state.cross, setup.constants)
         memory, rivals = self._memory(), self._rivals()
         cycle = process_scan(
-            for_kernels(self._state),
+            self._state.tracking,
             record.stamp_ns,
             following,
             scanner,
@@ -531,4 +536,4 @@ class Localizer:
             self._temporary_look(scan, scanner, memory, goods),
             rivals,
         )
-        return Cycle(cycle.prior, self._with_arrays(cycle.state, cross, memory, rivals))
+        return cycle.prior, self._with_arrays(cycle.state, cross, memory, rivals)

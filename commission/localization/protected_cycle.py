@@ -16,7 +16,7 @@ from commission.localization.protection import Bank, ProtectionModel, forget, pr
 from commission.localization.rival_poses import RivalPoses
 from commission.localization.scan_rows import ScanRows
 from commission.localization.setup import FilterModel
-from commission.localization.state import FilterState
+from commission.localization.state import Tracking
 from commission.localization.supervisor import FAIL, LOST, judge
 from commission.localization.zones import ZoneRows, kinds_at
 
@@ -32,7 +32,7 @@ class ProtectionRoom(NamedTuple):
 
 @compiled
 def supervised_by_level(  # noqa: PLR0917 - a cycle, and what it is written to
-    before: FilterState,
+    before: Tracking,
     cycle: Cycle,
     rows: ScanRows,
     observation: ObservationModel,
@@ -41,7 +41,7 @@ def supervised_by_level(  # noqa: PLR0917 - a cycle, and what it is written to
     levels: FloatArray,
     zones: ZoneRows,
     rivals: RivalPoses | None,
-) -> FilterState:
+) -> Tracking:
     """State after a cycle whose supervisor holds the protection level against its limits, in place of 2-sigma.
 
     Parameters

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.association import NOBODY
-from commission.localization.cycle import Cycle
 from commission.localization.estimate import Mode, Status
 from commission.localization.hypotheses import gaussian_of, judged_again, spread
 from commission.localization.odometry import NextOdometry, OdometryNoise, advance, reach
@@ -25,7 +24,7 @@ from commission.localization.search_map import SearchMap, anywhere
 from commission.localization.search_state import NOTHING, Search, new_search
 from commission.localization.seen_of_late import SeenScan, joined_scan
 from commission.localization.setup import LocalizerSetup
-from commission.localization.state import FilterState
+from commission.localization.state import FilterState, Tracking
 from commission.localization.supervisor import SupervisorLimits
 from commission.localization.trail_search import CONFIRMED, explained_again
 
@@ -51,7 +50,8 @@ def is_sought(state: FilterState, limits: SupervisorLimits) -> bool:
     state : before or after a scan.
     limits : of the supervisor.
     """
-    return state.mode == Mode.INITIALIZING or (state.mode == Mode.LOST and limits.find_again)
+    mode = state.tracking.mode
+    return mode == Mode.INITIALIZING or (mode == Mode.LOST and limits.find_again)
 
 
 def searching_odometry(
@@ -66,21 +66,16 @@ def searching_odometry(
     displacement : [m, m, rad].
     noise : variances per metre, radian and second.
     """
-    search, belief = state.search, state.belief
+    search, tracking = state.search, state.tracking
     if search is None:
         raise ValueError("the state has no search; expected one of a vehicle that is lost or not located yet")
-    track, motion = advance(search.track, state.motion, stamp_ns, *displacement, noise)
-    if state.mode != Mode.INITIALIZING:
-        belief, _ = advance(belief, state.motion, stamp_ns, *displacement, noise)
-    # As `process_odometry` has it; to hand a kernel the whole state takes ten times as long as to advance it.
-    return state._replace(
-        belief=belief,
-        belief_ns=stamp_ns,
-        motion=motion,
-        newest_ns=stamp_ns,
-        protection=None,
-        search=replace(search, track=track),
-    )
+    track, motion = advance(search.track, tracking.motion, stamp_ns, *displacement, noise)
+    belief = tracking.belief
+    if tracking.mode != Mode.INITIALIZING:
+        belief, _ = advance(belief, tracking.motion, stamp_ns, *displacement, noise)
+    # As `process_odometry` has it; to hand a kernel all of `tracking` takes ten times as long as to advance the belief.
+    moved = tracking._replace(belief=belief, belief_ns=stamp_ns, motion=motion, newest_ns=stamp_ns)
+    return state._replace(tracking=moved, protection=None, search=replace(search, track=track))
 
 
 def forgotten(state: FilterState, setup: LocalizerSetup) -> FilterState:
@@ -91,23 +86,20 @@ def forgotten(state: FilterState, setup: LocalizerSetup) -> FilterState:
     state : before.
     setup : its reflectors say how large the floor is.
     """
-    belief = anywhere(setup.index.places)
-    return state._replace(
+    belief, now_ns = anywhere(setup.index.places), state.tracking.belief_ns
+    tracking = state.tracking._replace(
         belief=belief,
         mode=int(Mode.INITIALIZING),
-        evidence=NO_EVIDENCE._replace(stamp_ns=state.belief_ns),
+        evidence=NO_EVIDENCE._replace(stamp_ns=now_ns),
         pivot=(belief.x, belief.y),
-        cross=None,
-        temporary=None,
-        search=new_search(state.belief_ns),
-        protection=None,
-        rivals=None,
-        lasting=None,
     )
+    return FilterState(tracking, state.sensor_detects, search=new_search(now_ns))
 
 
-def unlocated(state: FilterState, stamp_ns: int, following: NextOdometry, noise: OdometryNoise) -> Cycle:
-    """Reach the stamp of a scan without a belief to correct; nothing is associated.
+def unlocated(
+    state: FilterState, stamp_ns: int, following: NextOdometry, noise: OdometryNoise
+) -> tuple[PoseGaussian, FilterState]:
+    """Reach the stamp of a scan without a belief to correct; return the belief before it, and the state after it.
 
     Parameters
     ----------
@@ -116,8 +108,10 @@ def unlocated(state: FilterState, stamp_ns: int, following: NextOdometry, noise:
     following : the odometry record at or after the scan, where it is known.
     noise : of odometry.
     """
-    _, motion = reach(state.belief, state.motion, stamp_ns, following, noise)
-    return Cycle(state.belief, state._replace(belief_ns=stamp_ns, motion=motion, newest_ns=stamp_ns))
+    tracking = state.tracking
+    _, motion = reach(tracking.belief, tracking.motion, stamp_ns, following, noise)
+    reached = tracking._replace(belief_ns=stamp_ns, motion=motion, newest_ns=stamp_ns)
+    return tracking.belief, state._replace(tracking=reached)
 
 
 def associate_nothing(status: NDArray[np.int8], reflectors: IntArray, d2: FloatArray) -> None:
@@ -144,35 +138,38 @@ def sought(before: FilterState, after: FilterState, scan: SeenScan, around: Sear
     around : the map to search.
     """
     if before.search is None:
-        if after.mode != Mode.LOST:
+        if after.tracking.mode != Mode.LOST:
             return after
-        search = new_search(scan.stamp_ns, _last_good(before, scan.stamp_ns, around))
+        search = new_search(scan.stamp_ns, _last_good(before.tracking, scan.stamp_ns, around))
         track = NOTHING
     else:
         search = before.search
-        track, _ = reach(search.track, before.motion, scan.stamp_ns, scan.following, around.odometry)
+        track, _ = reach(search.track, before.tracking.motion, scan.stamp_ns, scan.following, around.odometry)
     search = joined_scan(search, track, scan)
-    now_ns = scan.stamp_ns
+    now_ns, never_located = scan.stamp_ns, before.tracking.mode == Mode.INITIALIZING
     waits = max(PERIOD_S * 1e9, min(PATIENCE * (now_ns - search.since_ns), LONGEST_PERIOD_S * 1e9))
     if now_ns - search.judged_ns >= waits:
         search = judged_again(search, now_ns, around)
-        search = explained_again(search, None if before.mode == Mode.INITIALIZING else after.belief, now_ns, around)
+        search = explained_again(search, None if never_located else after.tracking.belief, now_ns, around)
         best = _confirmed(search)
         if best is not None:
             return _located(before, after, search, best)
-    if before.mode == Mode.INITIALIZING:
-        return after._replace(belief=spread(search, around), search=search)
+    if never_located:
+        return after._replace(tracking=after.tracking._replace(belief=spread(search, around)), search=search)
     # What its own detections make of it is no confirmation: they may fit wrong reflectors.
-    return after._replace(mode=int(Mode.LOST), search=search, output=before.output, output_ns=before.output_ns)
+    lost = after.tracking._replace(
+        mode=int(Mode.LOST), output=before.tracking.output, output_ns=before.tracking.output_ns
+    )
+    return after._replace(tracking=lost, search=search)
 
 
-def _last_good(state: FilterState, stamp_ns: int, around: SearchMap) -> PoseGaussian:
+def _last_good(before: Tracking, stamp_ns: int, around: SearchMap) -> PoseGaussian:
     """Return where the vehicle was when it was last operational, as uncertain as it is by now."""
-    seconds = (stamp_ns - state.output_ns) * 1e-9
+    seconds = (stamp_ns - before.output_ns) * 1e-9
     missing, turning = around.odometry.missing_per_s2, around.odometry.turning_per_s2
     position = AROUND_M**2 + missing * seconds * seconds
     heading = min(AROUND_RAD**2 + turning * seconds * seconds, math.pi**2 / 3.0)
-    last = state.output
+    last = before.output
     return PoseGaussian(last.x, last.y, last.theta, position, 0.0, 0.0, position, 0.0, heading)
 
 
@@ -187,19 +184,14 @@ def _confirmed(search: Search) -> FloatArray | None:
 
 def _located(before: FilterState, after: FilterState, search: Search, best: FloatArray) -> FilterState:
     """Return the state of a filter that begins anew where the vehicle was found; the supervisor still withholds it."""
-    belief, stamp_ns = gaussian_of(best, search.track), after.belief_ns
-    return after._replace(
+    belief, stamp_ns = gaussian_of(best, search.track), after.tracking.belief_ns
+    tracking = after.tracking._replace(
         belief=belief,
         mode=int(Mode.FAIL),
         evidence=NO_EVIDENCE._replace(stamp_ns=stamp_ns, confirmed=0.0),
         # The filter may have believed its detections in this very scan.
-        output=before.output,
-        output_ns=before.output_ns,
+        output=before.tracking.output,
+        output_ns=before.tracking.output_ns,
         pivot=(belief.x, belief.y),
-        cross=None,
-        temporary=None,
-        search=None,
-        protection=None,
-        rivals=None,
-        lasting=None,
     )
+    return FilterState(tracking, after.sensor_detects)

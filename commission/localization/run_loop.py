@@ -52,7 +52,7 @@ from commission.localization.search_map import SearchMap, search_map
 from commission.localization.search_state import SearchMoment
 from commission.localization.seen_of_late import SeenScan
 from commission.localization.setup import FilterModel, LocalizerSetup
-from commission.localization.state import FilterState, for_kernels
+from commission.localization.state import FilterState, Tracking
 from commission.localization.supervisor import INITIALIZING, LOST
 from commission.localization.sweep import bring_to_stamp, sweep_at
 from commission.localization.tag_cycle import TagFrames, process_tags
@@ -348,15 +348,17 @@ def _searched(
     state = _carried(log, setup, state, cycle.rows)
     stamp_ns, row = int(cycle.detected.stamps_ns[0]), cycle.rows[1]
     following = NOT_YET
-    if row < len(log.odometry_stamps_ns) and log.odometry_stamps_ns[row] <= waits_until(state.motion, stamp_ns):
+    if row < len(log.odometry_stamps_ns) and log.odometry_stamps_ns[row] <= waits_until(
+        state.tracking.motion, stamp_ns
+    ):
         following = NextOdometry(True, int(log.odometry_stamps_ns[row]), *_driven(log, setup, row))
     columns, scanner = cycle.columns, int(cycle.detected.scanners[0])
-    if state.mode == INITIALIZING:
+    if state.tracking.mode == INITIALIZING:
         if len(columns.settled):
             measured, sweep = cycle.detected.range_bearing, sweep_at(setup.sweep_rows, scanner)
             rows = (0, len(measured))
             bring_to_stamp(
-                state.motion, following, *rows, measured, sweep, setup.observations[scanner], columns.settled
+                state.tracking.motion, following, *rows, measured, sweep, setup.observations[scanner], columns.settled
             )
         prior, after = unlocated(state, stamp_ns, following, setup.filter.odometry)
         associate_nothing(columns.status, columns.reflectors, columns.d2)
@@ -368,8 +370,8 @@ def _searched(
         if not is_sought(state, setup.filter.limits):
             return after
     state = _found(log, setup, search, (state, after), cycle, following)
-    _write_belief(state.belief, 0, columns.means, columns.covariances)
-    columns.modes[0] = state.mode
+    _write_belief(state.tracking.belief, 0, columns.means, columns.covariances)
+    columns.modes[0] = state.tracking.mode
     return state
 
 
@@ -394,7 +396,7 @@ def _tracked(
     is_scan = detected.is_scan
     numbers = np.arange(scans) if is_scan is None else np.flatnonzero(is_scan[:scans])
     before = stretch.first - detected.others_before
-    after, cycles, delivered = _run(
+    tracking, cycles, delivered = _run(
         OdometryRows(
             read_only(log.odometry_stamps_ns[rows]),
             read_only(as_driven(log.displacements[rows], setup.parameters.odometry)),
@@ -413,7 +415,7 @@ def _tracked(
         setup.zone_rows,
         np.empty((most, 3)),
         constants_room(cross, most),
-        for_kernels(state),
+        state.tracking,
         stretch.columns,
         stretch.priors,
         setup.contour,
@@ -424,18 +426,17 @@ def _tracked(
         None if setup.protection is None or bank is None else ProtectionRoom(setup.protection, bank),
         rivals,
     )
-    # Odometry alone changes nothing of it, nor does another setup before its first scan.
-    if not len(detected):
-        kept = {"cross": state.cross, "protection": state.protection}
-        kept |= {"temporary": state.temporary, "rivals": state.rivals, "lasting": state.lasting}
-        return after._replace(**kept), cycles, delivered
-    cross_after = cross_covariance(cross, setup.constants)
-    protection = protection_state(bank, setup.protected_names)
-    temporary = state.temporary if memory is None else landmarks_in(memory)
-    lasting = state.lasting if reflexes is None else lasting_innovations(reflexes.lasting, names)
-    after = after._replace(cross=cross_after, protection=protection, temporary=temporary)
-    after = after._replace(rivals=kept_poses(rivals), lasting=lasting)
-    return after, cycles, delivered
+    moved = state._replace(tracking=tracking)
+    if len(detected):
+        # Odometry alone changes nothing of it, nor does another setup before its first scan.
+        moved = moved._replace(
+            cross=cross_covariance(cross, setup.constants),
+            protection=protection_state(bank, setup.protected_names),
+            temporary=state.temporary if memory is None else landmarks_in(memory),
+            rivals=kept_poses(rivals),
+            lasting=state.lasting if reflexes is None else lasting_innovations(reflexes.lasting, names),
+        )
+    return moved, cycles, delivered
 
 
 def _frames(setup: LocalizerSetup, detected: DetectionLog) -> TagFrames | None:
@@ -509,7 +510,7 @@ def _run(  # noqa: PLR0917 - a stretch and all that it is looked at with
     zones: ZoneRows,
     aims: FloatArray,
     room: ConstantsRoom | None,
-    state: FilterState,
+    state: Tracking,
     columns: Columns,
     priors: PriorRows,
     contours: ContourModel | None,
@@ -519,7 +520,7 @@ def _run(  # noqa: PLR0917 - a stretch and all that it is looked at with
     reflexes: Reflexes | None,
     protected: ProtectionRoom | None,
     rivals: RivalPoses | None,
-) -> tuple[FilterState, int, int]:
+) -> tuple[Tracking, int, int]:
     """Deliver odometry and scans in the order of their stamps, odometry first, until the vehicle is lost.
 
     Returns the state after the last record, and how many scans and rows of odometry were delivered.
@@ -604,7 +605,7 @@ def _run(  # noqa: PLR0917 - a stretch and all that it is looked at with
 
 
 @compiled_inline
-def _with_odometry(state: FilterState, odometry: OdometryRows, row: int, noise: OdometryNoise) -> FilterState:
+def _with_odometry(state: Tracking, odometry: OdometryRows, row: int, noise: OdometryNoise) -> Tracking:
     """State after a row of odometry."""
     moved = odometry.displacements
     return process_odometry(state, odometry.stamps_ns[row], moved[row, 0], moved[row, 1], moved[row, 2], noise)

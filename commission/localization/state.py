@@ -1,7 +1,6 @@
 """The filter's whole state as one value: with it and the records to come, the rest of a run is decided.
 
-Scalars, the form in which kernels hand it to each other, but for one array that they are handed beside it; what the
-filter is given and does not change is `setup`.
+What the filter is given and does not change is `setup`.
 """
 
 from __future__ import annotations
@@ -24,8 +23,8 @@ NO_RECORD_NS = -(2**63)
 """Stamp of the newest record before there is one: no stamp is older [ns]."""
 
 
-class FilterState(NamedTuple):
-    """All that the localizer remembers from one record to the next."""
+class Tracking(NamedTuple):
+    """What kernels hand from one record to the next: scalars alone."""
 
     belief: PoseGaussian
     """The filter's own belief; it goes on in fail mode."""
@@ -43,24 +42,33 @@ class FilterState(NamedTuple):
     """Stamp that the output is about [ns]."""
     newest_ns: int
     """Stamp of the newest record of any kind [ns]."""
-    sensor_detects: bool
-    """Whether the sensor has ever sent detections of its own: from then on its scans are not detected from."""
     pivot: tuple[float, float]
-    """Where the belief was after the newest scan [m]: `cross` is about that place."""
-    cross: CrossCovariance | None
-    """Covariance with the considered constants; None: all are zero. Kernels are handed its array, and None here."""
-    search: Search | None = None
-    """What is known of a vehicle that is lost or not located yet; None while it knows where it is, and in kernels."""
-    protection: ProtectionState | None = None
-    """Filters that leave one reflector out each; None: not begun, or not asked for, and in kernels."""
-    temporary: TemporaryLandmarks | None = None
-    """Landmarks that come and go; None: none are remembered. Kernels are handed its arrays, and None here."""
-    rivals: KeptPoses | None = None
-    """Where the vehicle may stand as well; None: not begun, or scans are decided on one by one, and in kernels."""
-    lasting: LastingInnovations | None = None
-    """Mean innovations of bearings; None: there are none, and in kernels."""
+    """Where the belief was after the newest scan [m]: the covariance with the constants is about that place."""
     walls: WallDepth = AS_DRAWN
     """How far behind the faces that the floor map draws beams end."""
+
+
+class FilterState(NamedTuple):
+    """All that the localizer remembers from one record to the next.
+
+    What has a length of its own is handed to kernels as arrays, beside `tracking`, and written by them in place.
+    """
+
+    tracking: Tracking
+    sensor_detects: bool = False
+    """Whether the sensor has ever sent detections of its own: from then on its scans are not detected from."""
+    cross: CrossCovariance | None = None
+    """Covariance with the considered constants; None: all are zero."""
+    search: Search | None = None
+    """What is known of a vehicle that is lost or not located yet; None while it knows where it is."""
+    protection: ProtectionState | None = None
+    """Filters that leave one reflector out each; None: not begun, or not asked for."""
+    temporary: TemporaryLandmarks | None = None
+    """Landmarks that come and go; None: none are remembered."""
+    rivals: KeptPoses | None = None
+    """Where the vehicle may stand as well; None: not begun, or scans are decided on one by one."""
+    lasting: LastingInnovations | None = None
+    """Mean innovations of bearings; None: there are none."""
 
 
 def state_at_start(initial: Belief) -> FilterState:
@@ -68,17 +76,17 @@ def state_at_start(initial: Belief) -> FilterState:
     belief = from_belief(initial)
     stamp_ns = int(initial.stamp_ns)
     return FilterState(
-        belief=belief,
-        belief_ns=stamp_ns,
-        motion=AT_REST,
-        mode=int(Mode.OPERATIONAL),
-        evidence=NO_EVIDENCE._replace(stamp_ns=stamp_ns),
-        output=belief,
-        output_ns=stamp_ns,
-        newest_ns=NO_RECORD_NS,
-        sensor_detects=False,
-        pivot=(belief.x, belief.y),
-        cross=None,
+        Tracking(
+            belief=belief,
+            belief_ns=stamp_ns,
+            motion=AT_REST,
+            mode=int(Mode.OPERATIONAL),
+            evidence=NO_EVIDENCE._replace(stamp_ns=stamp_ns),
+            output=belief,
+            output_ns=stamp_ns,
+            newest_ns=NO_RECORD_NS,
+            pivot=(belief.x, belief.y),
+        )
     )
 
 
@@ -91,19 +99,15 @@ def state_unlocated(stamp_ns: int, anywhere: PoseGaussian) -> FilterState:
     anywhere : a belief as wide as the floor, see `SearchMap`.
     """
     unknown = state_at_start(to_belief(anywhere, stamp_ns))
-    return unknown._replace(mode=int(Mode.INITIALIZING), search=new_search(stamp_ns))
-
-
-def for_kernels(state: FilterState) -> FilterState:
-    """Return a state as kernels are handed it: of what has a length of its own they get arrays, or nothing."""
-    return state._replace(cross=None, search=None, protection=None, temporary=None, rivals=None, lasting=None)
+    tracking = unknown.tracking._replace(mode=int(Mode.INITIALIZING))
+    return unknown._replace(tracking=tracking, search=new_search(stamp_ns))
 
 
 def belief_of(state: FilterState) -> Belief:
     """Return the filter's own belief as arrays."""
-    return to_belief(state.belief, state.belief_ns)
+    return to_belief(state.tracking.belief, state.tracking.belief_ns)
 
 
 def output_of(state: FilterState) -> Belief:
     """Return what the vehicle is given as arrays."""
-    return to_belief(state.output, state.output_ns)
+    return to_belief(state.tracking.output, state.tracking.output_ns)

@@ -21,7 +21,7 @@ from commission.localization.rejection import NOTHING_COUNTED, weigh
 from commission.localization.rival_poses import RivalPoses
 from commission.localization.setup import FilterModel
 from commission.localization.several_scans import forget
-from commission.localization.state import FilterState
+from commission.localization.state import Tracking
 from commission.localization.tags import ACCEPTED, REJECTED, USE, TagModel, correct_by_tag
 from commission.localization.zones import ZoneRows, kinds_at
 
@@ -42,7 +42,7 @@ class TagFrames(NamedTuple):
 
 @compiled
 def process_tags(  # noqa: PLR0917 - a frame and all that it is looked at with
-    state: FilterState,
+    state: Tracking,
     stamp_ns: int,
     following: NextOdometry,
     first: int,

@@ -71,20 +71,16 @@ def told_by_tags(
         all_columns[:, model.first : model.first + PER_CAMERA] = columns[:, :PER_CAMERA]
         all_columns[:, tag : tag + PER_TAG] = columns[:, PER_CAMERA:]
         cross = cross_covariance(all_columns, setup.constants)
-    return after._replace(
+    tracking = after.tracking._replace(
         belief=belief,
         mode=int(Mode.FAIL),
-        evidence=NO_EVIDENCE._replace(stamp_ns=after.belief_ns, confirmed=0.0),
+        evidence=NO_EVIDENCE._replace(stamp_ns=after.tracking.belief_ns, confirmed=0.0),
         # The filter may have believed its sightings in this very frame.
-        output=before.output,
-        output_ns=before.output_ns,
+        output=before.tracking.output,
+        output_ns=before.tracking.output_ns,
         pivot=(belief.x, belief.y),
-        cross=cross,
-        temporary=None,
-        rivals=None,
-        lasting=None,
-        search=None,
     )
+    return FilterState(tracking, after.sensor_detects, cross, protection=after.protection)
 
 
 def _belief_at(

@@ -88,7 +88,7 @@ def _of_constants(
     if before is None or columns is None:
         return S
     F = np.eye(3)
-    F[:2, 2] = before.pivot[1] - belief.mean[1], belief.mean[0] - before.pivot[0]
+    F[:2, 2] = before.tracking.pivot[1] - belief.mean[1], belief.mean[0] - before.tracking.pivot[0]
     columns = F @ columns
     C = np.empty((count, 3, PER_REFLECTOR + PER_SCANNER))
     order = setup.index.places[:, 3].astype(np.int64)

@@ -288,7 +288,7 @@ def _final(
     if len(log) == 0:
         return final
     own = final.sensor_detects or len(log.detection_stamps_ns) > 0
-    return final._replace(newest_ns=log.last_ns, sensor_detects=own)
+    return final._replace(tracking=final.tracking._replace(newest_ns=log.last_ns), sensor_detects=own)
 
 
 def _chunks(segments: Sequence[RunSegment], begin: int, end: int) -> Iterator[tuple[RunSegment, int, int]]:

@@ -348,7 +348,7 @@ def test_live_is_the_whole_run_to_the_last_bit(consider):
     assert (counts[BearingUse.NONE], counts[BearingUse.UNKNOWN]) == (14, 27)
     assert counts[BearingUse.REJECTED] <= 2
     # Through a checkpoint in the middle, and with a setup that looks at no bearings from there on.
-    assert state_before(whole, log, 41).belief == from_belief(whole.estimate(40).posterior)
+    assert state_before(whole, log, 41).tracking.belief == from_belief(whole.estimate(40).posterior)
     blind = dataclasses.replace(setup.parameters, bearing=BearingParameters(enabled=False))
     segments = (RunSegment(0, setup), RunSegment(40, dataclasses.replace(setup, parameters=blind)))
     cut = run_segments(log, segments, NEAR)

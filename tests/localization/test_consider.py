@@ -90,9 +90,13 @@ def test_the_filter_agrees_with_a_dense_one_to_the_last_digits(plan: Plan, count
     order = setup.index.places[:, 3].astype(int)
     dense = np.concatenate([plain.cross[:, [2 * i, 2 * i + 1]] for i in order] + [plain.cross[:, 24:]], axis=1)
     scale = np.sqrt(np.outer(np.diag(plain.cov), np.diag(plain.constant)[_columns(order, count)]))
-    last = columns.final.belief
+    last = columns.final.tracking.belief
     shift = np.array(
-        [[1.0, 0.0, columns.final.pivot[1] - last.y], [0.0, 1.0, last.x - columns.final.pivot[0]], [0, 0, 1]]
+        [
+            [1.0, 0.0, columns.final.tracking.pivot[1] - last.y],
+            [0.0, 1.0, last.x - columns.final.tracking.pivot[0]],
+            [0, 0, 1],
+        ]
     )
     np.testing.assert_allclose((shift @ columns.final.cross.columns - dense) / scale, 0.0, rtol=0.0, atol=1e-9)
 

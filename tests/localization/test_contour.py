@@ -320,7 +320,7 @@ def test_whole_run_with_contours_equals_the_live_localizer_to_the_last_bit(scann
         assert estimate.mode == columns.modes[cycle]
     assert localizer.state == columns.final
     half = state_before(columns, log, len(columns) // 2)
-    assert half.belief == from_belief(columns.estimate(len(columns) // 2 - 1).posterior)
+    assert half.tracking.belief == from_belief(columns.estimate(len(columns) // 2 - 1).posterior)
 
 
 def test_contours_switched_on_along_the_way_count_from_there_on():

@@ -39,7 +39,8 @@ def localizer_in(floor, start, *, reflectors=None, to_confirm=False, **superviso
     )
     state = state_at_start(Belief(0, np.array(start, dtype=np.float64), KNOWN))
     if to_confirm:
-        state = state._replace(mode=int(Mode.FAIL), evidence=state.evidence._replace(confirmed=0.0))
+        evidence = state.tracking.evidence._replace(confirmed=0.0)
+        state = state._replace(tracking=state.tracking._replace(mode=int(Mode.FAIL), evidence=evidence))
     return Localizer(setup, state)
 
 

@@ -149,7 +149,7 @@ def test_no_turn_excuses_what_is_off_along_the_line_of_sight(metres: float, coun
     localizer = Localizer(localizer.setup, Belief(0, np.zeros(3), 1e-12 * np.eye(3)))
     localizer.feed(Odometry(0, np.zeros(3)))
     see(localizer, Detections(SECOND, np.array([[5.0 + sign * metres, 0.0]])))
-    counted = localizer.state.evidence
+    counted = localizer.state.tracking.evidence
     assert (counted.rejected, counted.near_rejected) == (counts, counts)
 
 
@@ -266,7 +266,7 @@ def test_rejected_detection_is_near_within_reach_and_turn_of_a_reflector(
     # 1 m + 0.1 rad at 5.22 m of range: 1.522 m.
     localizer = lonely(rejection_reach=1.0, rejection_turn=turn)
     see(localizer, Detections(SECOND, aside(metres)))
-    counted = localizer.state.evidence
+    counted = localizer.state.tracking.evidence
     assert (counted.rejected, counted.near_rejected) == (1.0, near)
     assert (counted.accepted, counted.near_accepted) == (0.0, 0.0)
 
@@ -278,7 +278,7 @@ def test_rejected_detection_that_an_allowed_error_explains_is_no_sign_of_being_l
     # 40 % of 0.1 m and of 0.055 rad at 5 m: 0.04 m + 0.11 m.
     localizer = lonely(heading_limit=0.055)
     see(localizer, Detections(SECOND, aside(metres)))
-    counted = localizer.state.evidence
+    counted = localizer.state.tracking.evidence
     assert (counted.rejected, counted.near_rejected) == (counts, counts)
 
 
@@ -293,7 +293,7 @@ def test_belief_beyond_twice_the_limits_must_be_confirmed_by_accepted_detections
         localizer.feed(Odometry(stamp, np.zeros(3)))
         (estimate,) = localizer.feed(Detections(stamp, np.array([[5.0, 0.0]])))
         modes.append(estimate.mode)
-        counted.append(localizer.state.evidence.confirmed)
+        counted.append(localizer.state.tracking.evidence.confirmed)
     if doubtful:
         assert counted == [0.0, 1.0, 2.0, 3.0, 4.0]
         assert modes == [Mode.FAIL] * 3 + [Mode.OPERATIONAL] * 2
@@ -323,19 +323,19 @@ def test_evidence_is_forgotten_to_a_third_in_a_window_but_not_below_what_it_take
     localizer = lonely(rejection_window=2.0, rejection_long_window=4.0, rejection_evidence=4.0)
     far = np.concatenate((np.tile([[9.0, 1.0]], (30, 1)), np.tile(aside(0.5), (30, 1))))
     see(localizer, Detections(SECOND, far))
-    counted = localizer.state.evidence
+    counted = localizer.state.tracking.evidence
     assert (counted.rejected, counted.near_rejected) == (60.0, 30.0)
     see(localizer, Detections(3 * SECOND, np.empty((0, 2))))
-    counted = localizer.state.evidence
+    counted = localizer.state.tracking.evidence
     assert (counted.rejected, counted.near_rejected) == pytest.approx((60.0 / math.sqrt(math.e), 30.0 / math.e))
     see(localizer, Detections(60 * SECOND, np.empty((0, 2))))
     # However long ago they were, four are kept in two seconds, and in proportion eight in four.
-    counted = localizer.state.evidence
+    counted = localizer.state.tracking.evidence
     assert (counted.rejected, counted.near_rejected) == pytest.approx((8.0, 4.0))
 
 
 def test_nothing_is_counted_before_the_first_scan() -> None:
-    assert lonely().state.evidence == NO_EVIDENCE._replace(stamp_ns=0)
+    assert lonely().state.tracking.evidence == NO_EVIDENCE._replace(stamp_ns=0)
 
 
 def test_what_the_detector_filter_rejects_does_not_count() -> None:
@@ -347,7 +347,7 @@ def test_what_the_detector_filter_rejects_does_not_count() -> None:
         localizer,
         Scan(stamp_ns=SECOND, ranges=ranges, angle_min=-math.pi, angle_increment=math.pi / 360.0, reflector=flags),
     )
-    counted = localizer.state.evidence
+    counted = localizer.state.tracking.evidence
     assert (counted.accepted, counted.rejected) == (0.0, 0.0)
     assert counted.stamp_ns == SECOND
 

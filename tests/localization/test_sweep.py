@@ -152,7 +152,7 @@ def test_motion_of_a_vehicle_is_the_twist_that_odometry_tells() -> None:
 
     for index in range(4):
         localizer.feed(Odometry(50_000_000 * index, step if index else np.zeros(3)))
-    motion = localizer.state.motion
+    motion = localizer.state.tracking.motion
     assert (motion.trend_x, motion.trend_y, motion.trend_theta) == pytest.approx((SPEED, 0.0, TURN_RATE), abs=1e-12)
 
 

@@ -289,7 +289,7 @@ def test_live_is_the_whole_run_to_the_last_bit(consider):
     assert frames.sum() == len(log.tags) == 50
     assert np.bincount(whole.tags[:, USE].astype(int)).tolist() == [0, 26, 0, 12]
     # Through a checkpoint in the middle, and with a setup that looks at no tags from there on.
-    assert state_before(whole, log, 41).belief == from_belief(whole.estimate(40).posterior)
+    assert state_before(whole, log, 41).tracking.belief == from_belief(whole.estimate(40).posterior)
     blind = dataclasses.replace(setup.parameters, tag=TagParameters(enabled=False))
     segments = (RunSegment(0, setup), RunSegment(40, dataclasses.replace(setup, parameters=blind)))
     cut = run_segments(log, segments, NEAR)
@@ -317,12 +317,14 @@ def test_what_a_frame_believed_by_itself_is_not_handed_out_once_a_tag_tells_anot
     frame = next(each for each in mixed().records() if isinstance(each, TagSightings) and len(each.ids))
     lost = state_unlocated(0, anywhere(STANDING.index.places))
     elsewhere = from_belief(Belief(0, np.array((7.0, -3.0, 1.0)), 1e-4 * np.eye(3)))
-    believed = lost._replace(belief=elsewhere, output=elsewhere, output_ns=5, mode=int(Mode.OPERATIONAL))
+    wrong = lost.tracking._replace(belief=elsewhere, output=elsewhere, output_ns=5, mode=int(Mode.OPERATIONAL))
+    believed = lost._replace(tracking=wrong)
     figures = np.zeros((len(frame.ids), COLUMNS))
     told = told_by_tags((lost, believed), STANDING, frame.sightings, np.array(frame.ids, dtype=np.str_), figures)
     assert told is not None
-    assert (told.output, told.output_ns, told.mode) == (lost.output, lost.output_ns, Mode.FAIL)
-    assert math.dist((told.belief.x, told.belief.y), (7.0, -3.0)) > 1.0
+    before, after = lost.tracking, told.tracking
+    assert (after.output, after.output_ns, after.mode) == (before.output, before.output_ns, Mode.FAIL)
+    assert math.dist((after.belief.x, after.belief.y), (7.0, -3.0)) > 1.0
 
 
 def test_a_place_told_by_a_tag_is_as_uncertain_as_many_such_places_scatter():

@@ -180,4 +180,4 @@ def test_log_without_scans_or_records_gives_no_cycles() -> None:
         initial,
     )
     assert len(moved) == 0
-    np.testing.assert_allclose(moved.final.belief[:2], [1.0 + np.cos(0.5), 2.0 + np.sin(0.5)])
+    np.testing.assert_allclose(moved.final.tracking.belief[:2], [1.0 + np.cos(0.5), 2.0 + np.sin(0.5)])

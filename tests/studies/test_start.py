@@ -58,7 +58,7 @@ def test_where_nobody_says_where_a_recording_starts_the_vehicle_looks_for_itself
     start = start_of(Project(reflectors=reflectors), recording())
     assert start.origin is StartOrigin.SEARCH
     state = start.state()
-    assert state.mode == Mode.INITIALIZING
+    assert state.tracking.mode == Mode.INITIALIZING
     assert state.search is not None
     # Evenly spread over the rectangle around the reflectors and 5 m beyond, and over all headings.
     assert_allclose(start.belief.mean, [5.0, 1.0, 0.0])
@@ -67,7 +67,7 @@ def test_where_nobody_says_where_a_recording_starts_the_vehicle_looks_for_itself
 
 def test_a_start_that_somebody_knows_is_tracked_from_the_first_record():
     state = start_of(project_with_route(), recording()).state()
-    assert (state.mode, state.search) == (Mode.OPERATIONAL, None)
+    assert (state.tracking.mode, state.search) == (Mode.OPERATIONAL, None)
 
 
 def test_an_empty_recording_is_refused():

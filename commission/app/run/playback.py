@@ -160,7 +160,7 @@ class Playback:
         before, twist = None, np.zeros(3)
         if setup.constants is not None:
             before = self._state_before(seen)
-            wheels, usual_ns = setup.parameters.odometry, before.motion.usual_ns
+            wheels, usual_ns = setup.parameters.odometry, before.tracking.motion.usual_ns
             twist = _twist_over(self._result.inputs.log, estimate.stamp_ns, usual_ns, wheels)
         return validation_ellipses(setup, estimate.prior, scanner=estimate.scanner, before=before, twist=twist)
 

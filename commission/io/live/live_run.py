@@ -176,7 +176,7 @@ class LiveRun:
             run, start = self._run, self._start
             if run is None or start is None:
                 return LiveResult(None, None, Mode.OPERATIONAL)
-            belief, mode, forgotten_s = belief_of(run.state), Mode(run.state.mode), self._forgotten_ns * 1e-9
+            belief, mode, forgotten_s = belief_of(run.state), Mode(run.state.tracking.mode), self._forgotten_ns * 1e-9
             columns = run.columns() if len(run) and judged is None else None
             log, spent = (self._log() if columns is not None else None), self._spent
             cycles = max(self._cycles, 1)

@@ -42,8 +42,8 @@ LOCALIZATION = (
     Mutant(
         name="what a frame believed by itself is handed out though a tag tells another place",
         file=FOLDER + "tag_start.py",
-        find="output=before.output",
-        replace="output=after.output",
+        find="output=before.tracking.output,",
+        replace="output=after.tracking.output,",
         tests=(
             TESTS + "test_tags.py::"
             "test_what_a_frame_believed_by_itself_is_not_handed_out_once_a_tag_tells_another_place",
