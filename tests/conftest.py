@@ -74,9 +74,7 @@ def seeds(request: pytest.FixtureRequest) -> Seeds:
     return Seeds(request.config.getoption("acceptance"))
 
 
-BROWSER = "browser"
-"""Name of what one worker runs that has the browser, see `run_together`."""
-LONGEST_FIRST = ("tests/acceptance", "tests/planning")
+LONGEST_FIRST = ("tests/browser", "tests/acceptance", "tests/planning")
 """Among several workers these begin, so that none waits for another one at the end."""
 
 
@@ -90,24 +88,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         config.hook.pytest_deselected(items=left_out)
         items[:] = [item for item in items if item not in left_out]
     if hasattr(config, "workerinput"):
-        items[:] = longest_first(items, int(config.workerinput["workercount"]))
-
-
-def longest_first(items: Sequence[pytest.Item], workers: int) -> list[pytest.Item]:
-    """Tests in the order in which several workers begin them.
-
-    One file of acceptance tests for each worker, which compile what a page would have to wait for; then the browser's,
-    the longest of all, for the worker that is done first; then what is long, and the rest.
-    """
-    files = [item.path.relative_to(REPOSITORY).as_posix() for item in items]
-    compiling = [*dict.fromkeys(file for file in files if file.startswith(LONGEST_FIRST[0]))][:workers]
-
-    def place(file: str) -> int:
-        if file in compiling:
-            return 0
-        return 1 if run_together(file) == BROWSER else 2 if file.startswith(LONGEST_FIRST) else 3
-
-    return [items[i] for i in sorted(range(len(items)), key=lambda i: place(files[i]))]
+        items.sort(key=lambda item: not item.path.relative_to(REPOSITORY).as_posix().startswith(LONGEST_FIRST))
 
 
 def run_together(nodeid: str) -> str:
@@ -118,7 +99,7 @@ def run_together(nodeid: str) -> str:
     would wait.
     """
     file = nodeid.partition("::")[0]
-    return BROWSER if file.startswith("tests/browser/") or _measures_time(file) else file
+    return "browser" if file.startswith("tests/browser/") or _measures_time(file) else file
 
 
 @functools.cache

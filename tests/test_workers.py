@@ -7,12 +7,10 @@ import re
 import subprocess
 import sys
 from collections import defaultdict
-from types import SimpleNamespace
-from typing import Any
 
 import pytest
 
-from tests.conftest import REPOSITORY, longest_first, run_together
+from tests.conftest import REPOSITORY, run_together
 
 
 def test_each_file_stays_on_one_worker_and_both_work() -> None:
@@ -42,19 +40,3 @@ def test_each_file_stays_on_one_worker_and_both_work() -> None:
 )
 def test_what_measures_time_goes_with_the_browser(nodeid: str, group: str) -> None:
     assert run_together(nodeid) == group
-
-
-def test_a_file_that_compiles_for_each_worker_comes_before_the_browser_and_the_browser_before_the_rest() -> None:
-    named = (
-        "acceptance/test_calibration.py",
-        "acceptance/test_contours.py",
-        "acceptance/test_contours.py",
-        "acceptance/test_diagnosis.py",
-        "app/base/test_cameras.py",
-        "browser/test_page.py",
-        "planning/test_cover.py",
-        "site/test_blind_sectors.py",
-    )
-    items: list[Any] = [SimpleNamespace(path=REPOSITORY / "tests" / name) for name in named]
-    begun = [item.path.relative_to(REPOSITORY / "tests").as_posix() for item in longest_first(items, 2)]
-    assert begun == [*named[:3], named[5], named[3], named[6], named[4], named[7]]
