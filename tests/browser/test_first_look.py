@@ -201,17 +201,17 @@ def test_the_numbers_of_now_stand_above_whatever_is_selected_and_nothing_is_name
     def stands_above() -> bool:
         """Whether mode and pose can be read, right above the tabs."""
         box, tab = now.bounding_box(), page.page.get_by_role("tab", name="Selection", exact=True).bounding_box()
-        assert box is not None
-        assert tab is not None
+        if box is None or tab is None:
+            return False
         shown = now.evaluate("e => e.scrollTop === 0 && e.innerText")
         return "Position x, y" in shown and 90.0 < box["height"] and box["y"] + box["height"] <= tab["y"] + 1.0
 
     page.wait_for_text("Nothing is selected.")
-    assert stands_above()
+    served.until(stands_above, 10.0)
     reflector = served.state.project.reflectors.reflectors[0]
     page.click_at((reflector.x, reflector.y))
     page.wait_for_text(f"Reflector {reflector.id}")
-    assert stands_above()
+    served.until(stands_above, 10.0)
     field = page.page.locator("label", has_text=re.compile(r"^y \[m\]$")).bounding_box()
     below = page.page.get_by_role("tab", name="Layers", exact=True).bounding_box()
     assert field is not None
@@ -221,7 +221,7 @@ def test_the_numbers_of_now_stand_above_whatever_is_selected_and_nothing_is_name
     served.until(lambda: len(served.state.project.reflectors) == count - 1)
     page.wait_for_text("Nothing is selected.")
     assert page.page.locator(".c-selected").count() == 0
-    assert stands_above()
+    served.until(stands_above, 10.0)
     page.page.keyboard.press("Control+z")
     served.until(lambda: len(served.state.project.reflectors) == count)
 
