@@ -89,12 +89,14 @@ def contour_scan(setup: LocalizerSetup, scan: Scan | None, scanner: int) -> Cont
 
 
 @compiled_inline
-def contour_scan_at(scans: ContourScans, cycle: int, observations: FloatArray, sweeps: FloatArray) -> ContourScan:
-    """Scan of a cycle.
+def contour_scan_at(
+    scans: ContourScans | None, cycle: int, observations: FloatArray, sweeps: FloatArray
+) -> ContourScan | None:
+    """Scan of a cycle, or None where nobody looks at it.
 
     Parameters
     ----------
-    scans : of the stretch.
+    scans : of the stretch, or None.
     cycle : in the stretch.
     observations, sweeps : see `observation_rows`, `sweep_rows`.
 
@@ -102,6 +104,8 @@ def contour_scan_at(scans: ContourScans, cycle: int, observations: FloatArray, s
     -----
     No formula: a row of each column.
     """
+    if scans is None:
+        return None
     scanner = scans.scanners[cycle]
     sweep = sweep_at(sweeps, scanner) if len(sweeps) else Sweep(1.0, 0.0, 0.0, 0.0)
     return ContourScan(

@@ -19,7 +19,7 @@ from commission.localization.bearings import COLUMNS as BEARING_COLUMNS
 from commission.localization.bearings import entries_named
 from commission.localization.consider import ConstantsRoom
 from commission.localization.contour import COLUMNS as CONTOUR_COLUMNS
-from commission.localization.contour import ContourModel
+from commission.localization.contour import ContourModel, ContourScan
 from commission.localization.contour_scans import ContourScans, contour_scan_at, contour_scans
 from commission.localization.cross_covariance import columns_of, cross_covariance
 from commission.localization.cycle import (
@@ -535,7 +535,8 @@ def _run(  # noqa: PLR0917 - a stretch and all that it is looked at with
         following = _following(odometry, delivered, waits_until(state.motion, stamps_ns[k]))
         observation = observation_at(observations, numbers[k])
         rows = ScanRows(offsets[k], offsets[k + 1], detections, aims, columns.status, columns.reflectors, columns.d2)
-        looked = temporary_look(temporary, scans, columns.temporary, k, scanners)
+        scan = contour_scan_at(scans, k, observations, sweeps)
+        looked = temporary_look(temporary, scan, columns.temporary, k)
         if frames is not None and frames.is_frame[k]:
             first, last = frames.offsets[k], frames.offsets[k + 1]
             cycle = process_tags(
@@ -584,7 +585,7 @@ def _run(  # noqa: PLR0917 - a stretch and all that it is looked at with
                 index,
                 zones,
                 room,
-                contour_look(contours, scans, columns.contours, k, scanners),
+                contour_look(contours, scan, columns.contours, k),
                 looked,
                 rivals,
             )
@@ -622,52 +623,47 @@ def _following(odometry: OdometryRows, row: int, until_ns: int) -> NextOdometry:
 
 @compiled_inline
 def contour_look(
-    model: ContourModel | None, scans: ContourScans | None, figures: FloatArray, cycle: int, scanners: ScannerRows
+    model: ContourModel | None, scan: ContourScan | None, figures: FloatArray, cycle: int
 ) -> ContourLook | None:
     """Scan of a cycle as contours are matched with it, or None where they are not looked at.
 
     Parameters
     ----------
     model : of the contours, or None.
-    scans : of the stretch, or None.
+    scan : of the cycle, or None.
     figures : (K, COLUMNS) of the stretch.
     cycle : in it.
-    scanners : of the vehicle.
 
     Notes
     -----
-    No formula: a row of each column.
+    No formula: it puts together.
     """
     if model is None:
         return None
-    if scans is None:
+    if scan is None:
         return None
-    return ContourLook(model, contour_scan_at(scans, cycle, scanners.observations, scanners.sweeps), figures[cycle])
+    return ContourLook(model, scan, figures[cycle])
 
 
 @compiled_inline
 def temporary_look(
-    rules: TemporaryRules | None, scans: ContourScans | None, figures: FloatArray, cycle: int, scanners: ScannerRows
+    rules: TemporaryRules | None, scan: ContourScan | None, figures: FloatArray, cycle: int
 ) -> TemporaryLook | None:
     """Scan of a cycle as temporary landmarks are looked for in it, or None where they are not.
 
     Parameters
     ----------
     rules : what they are looked for with, or None.
-    scans : of the stretch, or None.
-    figures : (K, COLUMNS) of the stretch.
-    cycle : in it.
-    scanners : of the vehicle.
+    scan, figures, cycle : as in `contour_look`.
 
     Notes
     -----
-    No formula: a row of each column.
+    No formula: it puts together.
     """
     if rules is None:
         return None
-    if scans is None:
+    if scan is None:
         return None
-    scan = contour_scan_at(scans, cycle, scanners.observations, scanners.sweeps)
     return TemporaryLook(rules.model, rules.memory, scan, figures[cycle])
 
 

@@ -14,12 +14,12 @@ import pytest
 from commission.io.bundled import bundled_folder
 from commission.io.project_file import load_project
 from commission.simulation.scenario import virtual_drive
-from commission.site.disturbances import ConstantErrors
 from commission.site.parameters import FilterParameters
 from commission.site.project import Project
 from commission.site.uncertainty import Uncertainty
 from tests.acceptance.judged import judge
 from tests.conftest import Seeds, few_of
+from tests.constants_as_known import constants_as_known
 from tests.planning.driven import QUICK
 
 DRIVES = 40
@@ -32,14 +32,7 @@ def drawn(site: str, survey: float) -> Project:
     """A bundled site whose constants are drawn as its uncertainty says, and its reflectors surveyed to a 1-sigma."""
     project = load_project(bundled_folder("maps") / site)
     known = Uncertainty(survey=survey)
-    mounting = (known.mounting_position, known.mounting_position, known.mounting_heading)
-    constants = ConstantErrors(
-        survey_sigma=survey,
-        mounting_sigma=mounting,
-        range_bias_sigma=known.range_bias,
-        clock_offset_sigma=known.clock,
-    )
-    disturbances = replace(project.disturbances.undisturbed(), constants=constants)
+    disturbances = replace(project.disturbances.undisturbed(), constants=constants_as_known(known))
     return replace(project, uncertainty=known, disturbances=disturbances)
 
 

@@ -12,7 +12,6 @@ from commission.io.project_file import load_project
 from commission.localization.estimate import Belief
 from commission.simulation.drive import scaled
 from commission.simulation.scenario import start_of, virtual_drive
-from commission.site.disturbances import ConstantErrors
 from commission.site.project import Project
 from commission.site.truth import Truth
 from commission.site.uncertainty import Uncertainty
@@ -20,6 +19,7 @@ from commission.studies.calibration import CalibrationInput, calibrate
 from commission.studies.start import Start, StartOrigin
 from tests.acceptance.eight import eight
 from tests.conftest import Seeds
+from tests.constants_as_known import with_wheels
 from tests.planning.driven import QUICK
 
 DRIVES, FEW_DRIVES = 60, 3
@@ -36,16 +36,7 @@ def drawn() -> Project:
     """The laboratory with every constant drawn as its uncertainty says, and wheels that are off."""
     project = load_project(bundled_folder("maps") / "laboratory")
     known = Uncertainty(survey=0.003)
-    constants = ConstantErrors(
-        survey_sigma=known.survey,
-        mounting_sigma=(known.mounting_position, known.mounting_position, known.mounting_heading),
-        range_bias_sigma=known.range_bias,
-        clock_offset_sigma=known.clock,
-        forward_scale_sigma=0.005,
-        wheel_scale_sigma=0.002,
-        separation_scale_sigma=0.01,
-    )
-    disturbances = replace(project.disturbances.undisturbed(), constants=constants)
+    disturbances = replace(project.disturbances.undisturbed(), constants=with_wheels(known))
     return replace(project, uncertainty=known, disturbances=disturbances)
 
 

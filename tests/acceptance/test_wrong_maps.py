@@ -16,7 +16,6 @@ import pytest
 from commission.localization.estimate import Belief, Mode
 from commission.simulation.drive import DriveOptions
 from commission.simulation.scenario import start_of, virtual_drive
-from commission.site.disturbances import ConstantErrors
 from commission.site.parameters import Parameters
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
@@ -26,6 +25,7 @@ from commission.studies.run import RunInput, RunResult, judged_run
 from commission.studies.start import Start, StartOrigin, unknown_start
 from tests.acceptance.test_operational import PEOPLE, SITES, hall
 from tests.conftest import Seeds, few_of
+from tests.constants_as_known import with_wheels
 
 pytestmark = pytest.mark.slow
 
@@ -48,16 +48,7 @@ def switched_on(world: Project, seed: int, believed: Project) -> RunResult:
 
 def drawn(project: Project, people: int) -> Project:
     """The site with people, and with every constant drawn as its uncertainty says."""
-    known = project.uncertainty
-    constants = ConstantErrors(
-        survey_sigma=known.survey,
-        mounting_sigma=(known.mounting_position, known.mounting_position, known.mounting_heading),
-        range_bias_sigma=known.range_bias,
-        clock_offset_sigma=known.clock,
-        forward_scale_sigma=0.005,
-        wheel_scale_sigma=0.002,
-        separation_scale_sigma=0.01,
-    )
+    constants = with_wheels(project.uncertainty)
     return replace(project, disturbances=replace(project.disturbances, people=people, constants=constants))
 
 

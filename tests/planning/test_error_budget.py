@@ -14,7 +14,7 @@ from commission.planning.error_budget import CONTRIBUTIONS, PredictedErrors, pre
 from commission.planning.error_kernels import ErrorModel, propagate_errors
 from commission.planning.route_prediction import PredictionOptions, plan_route, predict_route
 from commission.simulation.scenario import start_of, virtual_drive
-from commission.site.disturbances import ConstantErrors, Disturbances
+from commission.site.disturbances import Disturbances
 from commission.site.parameters import (
     AssociationParameters,
     FilterParameters,
@@ -25,6 +25,7 @@ from commission.site.parameters import (
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.uncertainty import Uncertainty
 from commission.studies.metrics import pose_errors, reference_at
+from tests.constants_as_known import constants_as_known
 from tests.odometry_of import PRECISE
 from tests.planning.driven import EXACT, QUICK
 from tests.planning.sites import open_field, surely_detected
@@ -154,15 +155,8 @@ def test_every_constant_has_its_own_part_of_the_error_and_none_that_is_exact():
 @pytest.mark.parametrize("consider", [True, False], ids=["considered", "taken for noise"])
 def test_predicted_error_is_that_of_drives_with_all_constants_drawn(consider: bool):
     drives, known = 40, Uncertainty()
-    mounting = (known.mounting_position, known.mounting_position, known.mounting_heading)
-    constants = ConstantErrors(
-        survey_sigma=known.survey,
-        mounting_sigma=mounting,
-        range_bias_sigma=known.range_bias,
-        clock_offset_sigma=known.clock,
-    )
     parameters = Parameters(observation=FITTING, odometry=PRECISE, filter=FilterParameters(consider=consider))
-    project = open_field(LINE, parameters=parameters, disturbances=Disturbances(constants=constants))
+    project = open_field(LINE, parameters=parameters, disturbances=Disturbances(constants=constants_as_known(known)))
     start = start_of(project, "Line")
     planned = plan_route(project, "Line", PredictionOptions(start_sigmas=tuple(start.sigmas.tolist())))
     predicted = np.square(predict_errors(planned, predict_route(planned)).sigmas)

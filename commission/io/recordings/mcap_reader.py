@@ -53,8 +53,8 @@ class Message:
     """Its bytes."""
 
 
-class McapFile:
-    """An MCAP file that is read from its begin.
+class MessageFile:
+    """A file that is read message by message, from its begin.
 
     Parameters
     ----------
@@ -69,6 +69,27 @@ class McapFile:
         """Messages of each channel, where the file has a summary."""
         self.is_cut = False
         """Whether the file ends inside a record: its recorder was stopped."""
+
+    def read_summary(self) -> bool:
+        """Read channels and counts without the messages; returns False where nothing says them."""
+        return False
+
+    def messages(self) -> Iterator[Message]:
+        """Deliver every message as it was written, up to where the file is cut.
+
+        Raises
+        ------
+        FileFormatError
+            the file cannot be read, is of another kind, or a record is damaged: says at which byte.
+        """
+        raise NotImplementedError
+
+
+class McapFile(MessageFile):
+    """An MCAP file."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
         self._schemas: dict[int, tuple[str, str, str]] = {}
 
     def read_summary(self) -> bool:

@@ -9,12 +9,11 @@ from __future__ import annotations
 import bz2
 import struct
 from collections.abc import Iterator
-from pathlib import Path
 from typing import IO
 
 from commission.errors import FileFormatError
 from commission.io.reading import cannot_read
-from commission.io.recordings.mcap_reader import RECORD_LIMIT, McapChannel, Message
+from commission.io.recordings.mcap_reader import RECORD_LIMIT, McapChannel, Message, MessageFile
 
 MAGIC = b"#ROSBAG V2.0\n"
 _MESSAGE, _CHUNK, _CONNECTION = 2, 5, 7
@@ -22,26 +21,8 @@ _HEADER_LIMIT = 1_000_000
 """Bytes of the header of a record; it holds a few names and numbers."""
 
 
-class Ros1File:
-    """A bag that is read from its begin; it offers what an MCAP file does.
-
-    Parameters
-    ----------
-    path : where it is.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.channels: dict[int, McapChannel] = {}
-        """Connections that were announced so far, by number."""
-        self.counts: dict[int, int] = {}
-        """Messages of each, which nothing says."""
-        self.is_cut = False
-        """Whether the file ends inside a record: its recorder was stopped."""
-
-    def read_summary(self) -> bool:
-        """Return that there is none."""
-        return False
+class Ros1File(MessageFile):
+    """A bag of ROS 1; it has no summary, as its index may be missing."""
 
     def messages(self) -> Iterator[Message]:
         """Deliver every message as it was written, up to where the file is cut.

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 from commission.errors import FileFormatError, reason_of
 from commission.io.reading import cannot_read
 from commission.io.recordings.bag_parts import METADATA, files_of, missing_parts, unmerged
-from commission.io.recordings.mcap_reader import MAGIC, McapChannel, McapFile, Message
+from commission.io.recordings.mcap_reader import MAGIC, McapChannel, McapFile, Message, MessageFile
 from commission.io.recordings.packed_bag import packed_files, unpacked_folder
 from commission.io.recordings.ros1_file import Ros1File
 from commission.io.recordings.ros_types import learn_type, ros2_type, ros2_types, typestore_of, unpacked_message
@@ -236,7 +236,7 @@ class McapSource:
         return self._typestores[key]
 
 
-def _file_of(path: Path) -> McapFile | Ros1File:
+def _file_of(path: Path) -> MessageFile:
     return Ros1File(path) if _begins_with(path, ROS1_MAGIC) else McapFile(path)
 
 
