@@ -16,7 +16,7 @@ from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.localization.bearing_cycle import Reflexes, process_reflex
 from commission.localization.bearings import COLUMNS as BEARING_COLUMNS
 from commission.localization.bearings import entries_named
-from commission.localization.contour import COLUMNS
+from commission.localization.contour import COLUMNS, ContourScan
 from commission.localization.contour_scans import contour_scan
 from commission.localization.cross_covariance import columns_of, cross_covariance
 from commission.localization.cycle import (
@@ -418,7 +418,7 @@ class Localizer:
             setup.index.places,
             setup.zone_rows,
             constants_room(cross, 0),
-            self._temporary_look(None, 0, memory, goods),
+            self._temporary_look(contour_scan(setup, None, 0), memory, goods),
             rivals,
         )
         after = self._with_arrays(cycle.state, cross, memory, rivals)
@@ -464,7 +464,7 @@ class Localizer:
             setup.filter,
             setup.zone_rows,
             constants_room(cross, 0),
-            self._temporary_look(None, 0, memory, goods),
+            self._temporary_look(contour_scan(setup, None, 0), memory, goods),
             rivals,
         )
         return cycle.prior, self._with_arrays(cycle.state, cross, memory, rivals)
@@ -494,19 +494,19 @@ class Localizer:
             rivals=kept_poses(rivals),
         )
 
-    def _contour_look(self, scan: Scan | None, scanner: int, figures: FloatArray | None) -> ContourLook | None:
+    def _contour_look(self, scan: ContourScan | None, figures: FloatArray | None) -> ContourLook | None:
         """A scan as contours are matched with it; None where they are not looked at."""
-        model, read = self._setup.contour, contour_scan(self._setup, scan, scanner)
-        return None if model is None or read is None or figures is None else ContourLook(model, read, figures)
+        model = self._setup.contour
+        return None if model is None or scan is None or figures is None else ContourLook(model, scan, figures)
 
     def _temporary_look(
-        self, scan: Scan | None, scanner: int, memory: TemporaryMemory | None, figures: FloatArray | None
+        self, scan: ContourScan | None, memory: TemporaryMemory | None, figures: FloatArray | None
     ) -> TemporaryLook | None:
         """A scan as temporary landmarks are looked for in it; None where they are not."""
-        model, read = self._setup.temporary, contour_scan(self._setup, scan, scanner)
-        if model is None or memory is None or read is None or figures is None:
+        model = self._setup.temporary
+        if model is None or memory is None or scan is None or figures is None:
             return None
-        return TemporaryLook(model, memory, read, figures)
+        return TemporaryLook(model, memory, scan, figures)
 
     def _filtered(
         self,
@@ -517,10 +517,11 @@ class Localizer:
         goods: FloatArray | None,
     ) -> tuple[PoseGaussian, FilterState]:
         """Let the filter process a scan; what becomes of its detections, contours and goods is written."""
-        setup, scan = self._setup, record if isinstance(record, Scan) else None
+        setup = self._setup
         scanner = 0 if isinstance(record, TagSightings | Reflex) else record.scanner
         cross = columns_of(self._state.cross, setup.constants)
         memory, rivals = self._memory(), self._rivals()
+        scan = contour_scan(setup, record if isinstance(record, Scan) else None, scanner)
         cycle = process_scan(
             self._state.tracking,
             record.stamp_ns,
@@ -532,8 +533,8 @@ class Localizer:
             setup.index,
             setup.zone_rows,
             constants_room(cross, rows.last),
-            self._contour_look(scan, scanner, figures),
-            self._temporary_look(scan, scanner, memory, goods),
+            self._contour_look(scan, figures),
+            self._temporary_look(scan, memory, goods),
             rivals,
         )
         return cycle.prior, self._with_arrays(cycle.state, cross, memory, rivals)
