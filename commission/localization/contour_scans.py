@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from commission.compiled import compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.localization.contour import ContourScan
-from commission.localization.observation import observation_at
+from commission.localization.observation import ObservationModel, observation_at
 from commission.localization.setup import LocalizerSetup
 from commission.localization.sweep import AT_ONCE, Sweep, sweep_at
 from commission.site.record_log import RecordLog
@@ -76,14 +76,27 @@ def contour_scan(setup: LocalizerSetup, scan: Scan | None, scanner: int) -> Cont
         return None
     if scan is None:
         scanner = 0
+    return scan_seen_by(scan, scanner, setup.observations[scanner], setup.sweep_rows)
+
+
+def scan_seen_by(scan: Scan | None, scanner: int, observation: ObservationModel, sweep_rows: FloatArray) -> ContourScan:
+    """Return one scan for kernels.
+
+    Parameters
+    ----------
+    scan : the scan; None: one without beams.
+    scanner : index of the scanner.
+    observation : its mounting and noise.
+    sweep_rows : see `LocalizerSetup`.
+    """
     ranges = np.empty(0, dtype=np.float32) if scan is None else scan.ranges
     return ContourScan(
         read_only(np.ascontiguousarray(ranges, dtype=np.float32)),
         0.0 if scan is None else float(scan.angle_min),
         0.0 if scan is None else float(scan.angle_increment),
         scanner,
-        setup.observations[scanner],
-        Sweep(*setup.sweep_rows[scanner].tolist()) if len(setup.sweep_rows) else AT_ONCE,
+        observation,
+        Sweep(*sweep_rows[scanner].tolist()) if len(sweep_rows) else AT_ONCE,
         len(ranges),
     )
 

@@ -48,21 +48,21 @@ class Reading(NamedTuple):
     along_rows: float
 
 
-class _Itself:
+class ItsOwnKey:
     """A map as the key of a cache: equal to itself alone, so that no cells are compared."""
 
     def __init__(self, floor: FloorMap) -> None:
         self.floor = floor
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Itself) and other.floor is self.floor
+        return isinstance(other, ItsOwnKey) and other.floor is self.floor
 
     def __hash__(self) -> int:
         return id(self.floor)
 
 
 @functools.lru_cache(maxsize=2)
-def _tables_of(key: _Itself) -> ContourTables:
+def _tables_of(key: ItsOwnKey) -> ContourTables:
     floor = key.floor
     distances = signed_distances(floor.occupancy())
     distances.setflags(write=False)
@@ -77,7 +77,7 @@ def contour_tables(floor: FloorMap) -> ContourTables:
     ----------
     floor : its occupied cells are contours; unknown ones are free, as they are for beams.
     """
-    return _tables_of(_Itself(floor))
+    return _tables_of(ItsOwnKey(floor))
 
 
 def signed_distances(grid: OccupancyGrid) -> NDArray[np.float32]:

@@ -167,7 +167,7 @@ class GrowingRun:
             self._append(estimate)
             search = self._localizer.state.search
             if search is not None:
-                self._searches.append(SearchMoment(self._count - 1, search.told, search.track, search.agreed))
+                self._searches.append(search.moment(self._count - 1))
             if self._count % CHECKPOINT_CYCLES == 0:
                 self._checkpoints.append(Checkpoint(self._count, self._localizer.state))
         return estimate

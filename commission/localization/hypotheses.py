@@ -92,7 +92,7 @@ def prior_of(search: Search, around: SearchMap) -> Prior:
     search : with the last good pose, where there is one.
     around : the map to search.
     """
-    even = -math.log(2.0 * math.pi * around.table.area)
+    even = -math.log(2.0 * math.pi * around.area)
     if search.around is None:
         return Prior(even, False, 0.0, 0.0, 0.0, 1.0, 1.0)
     # The vehicle has moved since, by what odometry says.
@@ -221,7 +221,9 @@ class Hypothesis:
     probability: float
     """By all that was seen [0..1]; what is missing to one over all is that it is none of them."""
     fits: int
-    """Things seen of late that fit a reflector there."""
+    """Things seen of late that fit a reflector there; by contours, percent of the newest scan that lies on walls."""
+    by_contours: bool
+    """Whether it is one by the contours of the hall."""
     agreed: int
     """Attempts in a row in which it was the only one left."""
 
@@ -241,6 +243,7 @@ def hypotheses_of(moment: SearchMoment) -> tuple[Hypothesis, ...]:
             probability=float(probability),
             fits=int(row[10]),
             agreed=int(row[11]),
+            by_contours=moment.by_contours,
         )
         for belief, probability, row in zip(beliefs, probabilities(moment.hypotheses), moment.hypotheses, strict=True)
     )

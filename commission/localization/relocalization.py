@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.association import NOBODY
+from commission.localization.contour_hypotheses import seen_again
 from commission.localization.estimate import Mode, Status
 from commission.localization.hypotheses import gaussian_of, judged_again, spread
 from commission.localization.odometry import NextOdometry, OdometryNoise, advance, reach
@@ -30,6 +31,8 @@ from commission.localization.trail_search import CONFIRMED, explained_again
 
 CONFIRMATIONS = 5
 """Scans in a row in which one hypothesis must have these odds."""
+CONFIRMED_BY_CONTOURS = 8.0
+"""Views in a row in which one place must be the only one left by the contours of the hall."""
 PERIOD_S = 0.1
 """Time between two attempts at least [s]."""
 PATIENCE = 0.02
@@ -84,9 +87,9 @@ def forgotten(state: FilterState, setup: LocalizerSetup) -> FilterState:
     Parameters
     ----------
     state : before.
-    setup : its reflectors say how large the floor is.
+    setup : its reflectors, and its floor map where contours are looked at, say how large the floor is.
     """
-    belief, now_ns = anywhere(setup.index.places), state.tracking.belief_ns
+    belief, now_ns = anywhere(setup.index.places, setup.contour_floor), state.tracking.belief_ns
     tracking = state.tracking._replace(
         belief=belief,
         mode=int(Mode.INITIALIZING),
@@ -151,9 +154,13 @@ def sought(before: FilterState, after: FilterState, scan: SeenScan, around: Sear
     if now_ns - search.judged_ns >= waits:
         search = judged_again(search, now_ns, around)
         search = explained_again(search, None if never_located else after.tracking.belief, now_ns, around)
-        best = _confirmed(search)
-        if best is not None:
-            return _located(before, after, search, best)
+    search = seen_again(search, scan, before.tracking.motion, before.tracking.walls, around)
+    best = _confirmed(search)
+    if best is not None:
+        return _located(before, after, search, best)
+    if not around.has_reflectors and after.tracking.mode not in (Mode.LOST, Mode.INITIALIZING):
+        # By contours, which have to match far better then: see `observe_contours`.
+        return after._replace(search=None)
     if never_located:
         return after._replace(tracking=after.tracking._replace(belief=spread(search, around)), search=search)
     # What its own detections make of it is no confirmation: they may fit wrong reflectors.
@@ -179,6 +186,9 @@ def _confirmed(search: Search) -> FloatArray | None:
         return search.hypotheses[0]
     if len(search.explained) and search.explained[0, 11] >= CONFIRMED:
         return search.explained[0]
+    views = search.contours.hypotheses
+    if len(views) and views[0, 11] >= CONFIRMED_BY_CONTOURS:
+        return views[0]
     return None
 
 

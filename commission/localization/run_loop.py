@@ -251,8 +251,7 @@ def continued(log: RecordLog, setup: LocalizerSetup, state: FilterState, stretch
             newest = _part(stretch, (done - 1, done), (row, row))
             state = _found(log, setup, search, (state, state), newest, NOT_YET)
         if cycles and state.search is not None and stretch.searches is not None:
-            found = state.search
-            stretch.searches.append(SearchMoment(stretch.first + done - 1, found.told, found.track, found.agreed))
+            stretch.searches.append(state.search.moment(stretch.first + done - 1))
         if done == count and row == end:
             break
     if len(own) and count and detected.stamps_ns[-1] >= own[0]:

@@ -17,6 +17,24 @@ from commission.localization.trail_fit import Trail
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ContourViews:
+    """Hypotheses by the contours of the hall; arrays are read-only."""
+
+    hypotheses: FloatArray
+    """(H, ROW) see `start`, the likeliest first; in place of things that fit, percent of the points that do."""
+    past: FloatArray
+    """(H,) what views before the newest one that counts said of each: log of how much likelier than anywhere."""
+    said: FloatArray
+    """(H,) what the newest one says."""
+    judged_ns: int
+    """Stamp of the last attempt [ns]."""
+    view: tuple[float, float, float]
+    """Pose of base in the frame of odometry at the newest view that counts [m, m, rad]."""
+    scanner: int
+    """Which scanner it was of."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Search:
     """What is remembered while the vehicle does not know where it is; arrays are read-only."""
 
@@ -46,26 +64,43 @@ class Search:
     """How much of the way lies behind the last attempt to explain the trail, see `way_between`."""
     explained: FloatArray
     """(H, ROW) hypotheses by the trail, the likeliest first."""
+    contours: ContourViews
+    """Hypotheses by the contours of the hall, where they are looked at."""
 
     @property
     def told(self) -> FloatArray:
-        """(H, ROW) hypotheses as they stand: by the way as a whole where scans see too little, else by things."""
-        return self.explained if len(self.explained) else self.hypotheses
+        """(H, ROW) hypotheses as they stand: by the way as a whole, else by things, else by contours."""
+        by_reflectors = self.explained if len(self.explained) else self.hypotheses
+        return by_reflectors if len(by_reflectors) else self.contours.hypotheses
 
     @property
-    def agreed(self) -> tuple[int, int]:
-        """Attempts in a row in which one place was left: by things that came back, and by the way as a whole."""
-        by_things, by_way = (int(each[0, 11]) if len(each) else 0 for each in (self.hypotheses, self.explained))
-        return by_things, by_way
+    def agreed(self) -> Agreed:
+        """Attempts in a row in which one place was left."""
+        told = (self.hypotheses, self.explained, self.contours.hypotheses)
+        return Agreed(*(int(each[0, 11]) if len(each) else 0 for each in told))
+
+    def moment(self, cycle: int) -> SearchMoment:
+        """Return what the search tells after a cycle.
+
+        Parameters
+        ----------
+        cycle : its index.
+        """
+        by_contours = not len(self.explained) and not len(self.hypotheses)
+        return SearchMoment(cycle, self.told, self.track, self.agreed, by_contours)
 
     def _content(self) -> tuple[object, ...]:
         """All of it, comparable."""
         arrays = (
             each.tobytes()
-            for each in (self.things, self.views, self.ends, self.hypotheses, *self.trail, self.explained)
+            for each in (
+                *(self.things, self.views, self.ends, self.hypotheses, *self.trail, self.explained),
+                *(self.contours.hypotheses, self.contours.past, self.contours.said),
+            )
         )
         scalars = (self.since_ns, self.around, self.track, self.drift, self.searched_ns, self.judged_ns, self.way)
-        return (*scalars, *arrays)
+        views = self.contours.judged_ns, self.contours.view, self.contours.scanner
+        return (*scalars, *views, *arrays)
 
     def __eq__(self, other: object) -> bool:
         """Whether both go on alike, to the last bit."""
@@ -74,6 +109,16 @@ class Search:
     def __hash__(self) -> int:
         """Equal ones have the same."""
         return hash(self._content())
+
+
+class Agreed(NamedTuple):
+    """Attempts in a row in which one place was left."""
+
+    by_things: int = 0
+    """By things that came back."""
+    by_way: int = 0
+    """By the way as a whole."""
+    by_contours: int = 0
 
 
 class SearchMoment(NamedTuple):
@@ -85,8 +130,10 @@ class SearchMoment(NamedTuple):
     """(H, ROW) see `Search`."""
     track: PoseGaussian
     """Pose of base in the frame of odometry at that cycle."""
-    agreed: tuple[int, int] = (0, 0)
+    agreed: Agreed = Agreed()
     """See `Search`."""
+    by_contours: bool = False
+    """Whether they are hypotheses by contours, see `ContourViews`."""
 
 
 NOTHING = PoseGaussian(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -114,4 +161,12 @@ def new_search(stamp_ns: int, around: PoseGaussian | None = None) -> Search:
         trail=no_trail(),
         way=0.0,
         explained=read_only(np.empty((0, ROW))),
+        contours=ContourViews(
+            hypotheses=read_only(np.empty((0, ROW))),
+            past=read_only(np.empty(0)),
+            said=read_only(np.empty(0)),
+            judged_ns=LONG_AGO_NS,
+            view=(0.0, 0.0, 0.0),
+            scanner=-1,
+        ),
     )

@@ -125,9 +125,9 @@ class LocalizerSetup:
         considers, known = self.parameters.filter.consider, self.uncertainty
         index = build_index(self.reflectors, self.survey_sigmas)
         limits = supervisor_limits(self.parameters.supervisor)
-        # A search among fewer, or by bearings alone, could never end; who is lost is so until what is seen fits again.
-        ranging = any(not scanner.is_goniometer for scanner in self.scanners)
-        limits = limits._replace(find_again=limits.find_again and ranging and len(index.places) >= FEWEST_TO_FIND)
+        # A search by neither could never end; who is lost is so until what is seen fits again.
+        can_find = self.finds_by_reflectors or self.contour_floor is not None
+        limits = limits._replace(find_again=limits.find_again and can_find)
         kind = filter_kind(self.parameters.filter)
         model = FilterModel(
             odometry_noise(self.parameters.odometry)._replace(curved=float(is_invariant(kind))),
@@ -162,6 +162,17 @@ class LocalizerSetup:
         object.__setattr__(self, "sweep_rows", sweep_rows([sweep_of(each) for each in self.scanners]))
         detectors = tuple(detector_model(self.reflectors, each, self.parameters.detector) for each in self.scanners)
         object.__setattr__(self, "detectors", detectors)
+
+    @property
+    def finds_by_reflectors(self) -> bool:
+        """Whether a lost vehicle can be found by reflectors: not among a few of them, nor by bearings alone."""
+        ranging = any(not scanner.is_goniometer for scanner in self.scanners)
+        return ranging and len(self.reflectors.reflectors) >= FEWEST_TO_FIND
+
+    @property
+    def contour_floor(self) -> FloorMap | None:
+        """The floor map whose contours are looked at; None: they are not."""
+        return self.floor if self.parameters.contour.enabled else None
 
     @property
     def decides_over_scans(self) -> bool:

@@ -20,8 +20,9 @@ from commission.geometry.stretches import stretches_of
 from commission.localization import bearings
 from commission.localization.estimate import Mode, Status
 from commission.localization.observation import project_detections
-from commission.localization.relocalization import CONFIRMATIONS
+from commission.localization.relocalization import CONFIRMATIONS, CONFIRMED_BY_CONTOURS
 from commission.localization.run_columns import RunColumns
+from commission.localization.search_state import Agreed
 from commission.localization.tags import USE, TagUse
 from commission.localization.trail_search import CONFIRMED
 from commission.progress import Progress, silent
@@ -191,11 +192,13 @@ def _found_by(columns: RunColumns, cycle: int) -> str:
         rows = slice(int(tags.offsets[cycle]), int(tags.offsets[cycle + 1]))
         if (columns.tags[rows, USE] == TagUse.LOCATED).any():
             return "by a tag whose id was read"
-    by_things, by_way = (0, 0) if sought is None else sought.agreed
+    by_things, by_way, by_contours = Agreed() if sought is None else sought.agreed
     if by_things + 1 >= CONFIRMATIONS:
         return f"the only place left in {CONFIRMATIONS} attempts"
     if by_way + 1 >= CONFIRMED:
         return f"the only place left in {int(CONFIRMED)} attempts by the whole way"
+    if by_contours + 1 >= CONFIRMED_BY_CONTOURS:
+        return f"the only place left in {int(CONFIRMED_BY_CONTOURS)} views by the contours of the hall"
     return "the only place left"
 
 

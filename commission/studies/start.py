@@ -17,6 +17,7 @@ from commission.localization.estimate import Belief
 from commission.localization.pose_gaussian import from_belief, to_belief
 from commission.localization.search_map import anywhere
 from commission.localization.state import FilterState, state_at_start, state_unlocated
+from commission.site.floor_map import FloorMap
 from commission.site.project import Project
 from commission.site.record_log import RecordLog
 from commission.site.routes import Direction, Route
@@ -65,21 +66,23 @@ def unknown_start(project: Project, log: RecordLog) -> Start:
 
     Parameters
     ----------
-    project : its reflectors say how large the floor is.
+    project : it says how large the floor is.
     log : the recording; not empty, else UsageError.
     """
-    return unknown_start_at(_first_stamp(log), project.reflectors.centers)
+    floor = project.floor_map if project.parameters.contour.enabled else None
+    return unknown_start_at(_first_stamp(log), project.reflectors.centers, floor)
 
 
-def unknown_start_at(stamp_ns: int, centers: FloatArray) -> Start:
+def unknown_start_at(stamp_ns: int, centers: FloatArray, floor: FloorMap | None = None) -> Start:
     """Return the start of a vehicle that looks where it is.
 
     Parameters
     ----------
     stamp_ns : of the first record [ns].
     centers : (N, 2) places of the reflectors [m], map frame: they say how large the floor is.
+    floor : the floor map where its contours are looked at: it says so as well.
     """
-    return Start(to_belief(anywhere(centers), stamp_ns), StartOrigin.SEARCH)
+    return Start(to_belief(anywhere(centers, floor), stamp_ns), StartOrigin.SEARCH)
 
 
 def _first_stamp(log: RecordLog) -> int:

@@ -18,7 +18,9 @@ from commission.geometry.raycast import RayCaster
 from commission.localization.estimate import Belief
 from commission.localization.growing_run import GrowingRun
 from commission.localization.run_columns import RunColumns
+from commission.localization.search_map import search_map
 from commission.localization.setup import LocalizerSetup
+from commission.localization.state import state_unlocated
 from commission.site.floor_map import FREE, OCCUPIED, FloorMap
 from commission.site.parameters import ContourParameters, Parameters
 from commission.site.records import Odometry, Record, Scan
@@ -53,11 +55,24 @@ class Office:
         records[middle] = replace(records[middle], displacement=moved)
         return replace(self, records=records)
 
-    def localized(self) -> RunColumns:
-        """By contours alone, with default parameters."""
+    def carried(self, first: int, last: int) -> Office:
+        """The same drive without what lies between two scans: somebody carries the robot, and no wheel turns."""
+        kept = [*range(first), *range(last, len(self.poses))]
+        records: list[Record] = []
+        for number, k in enumerate(kept):
+            odometry, scan = self.records[2 * k : 2 * k + 2]
+            still = np.zeros(3) if k == last else odometry.displacement  # type: ignore[union-attr]
+            stamp_ns = round(number * 1e9 / LASER.rate)
+            records.append(replace(odometry, stamp_ns=stamp_ns, displacement=still))
+            records.append(replace(scan, stamp_ns=stamp_ns + 1))
+        return replace(self, records=records, poses=self.poses[kept])
+
+    def localized(self, *, told: bool = True) -> RunColumns:
+        """By contours alone, with default parameters; not told where it starts, it looks for that."""
         parameters = Parameters(contour=ContourParameters(enabled=True))
         setup = LocalizerSetup(reflectors=ReflectorMap(), scanners=(LASER,), parameters=parameters, floor=self.floor)
-        run = GrowingRun(setup, Belief(0, self.poses[0], np.diag(np.square((0.1, 0.1, 0.05)))))
+        start = Belief(0, self.poses[0], np.diag(np.square((0.1, 0.1, 0.05))))
+        run = GrowingRun(setup, start if told else state_unlocated(0, search_map(setup).anywhere))
         for record in self.records:
             run.feed(record)
         run.flush()

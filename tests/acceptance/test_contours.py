@@ -28,7 +28,7 @@ from commission.site.records import Odometry, Scan
 from commission.site.reflectors import ReflectorMap
 from commission.site.scanner import Scanner
 from commission.studies.metrics import pose_errors, reference_at
-from tests.acceptance.office import drive, map_of_scans, map_with_thick_walls
+from tests.acceptance.office import LASER, drive, map_of_others, map_of_scans, map_with_thick_walls
 from tests.conftest import REPOSITORY
 
 NAV = Scanner(field_of_view_deg=(-180.0, 180.0), resolution_deg=0.25, range=(0.05, 40.0))
@@ -230,6 +230,54 @@ def test_a_robot_that_slips_in_that_office_is_found_by_its_contours(shared_data,
         assert max(len(list(group)) if key else 0 for key, group in itertools.groupby(wrong)) <= 15
         assert columns.modes[-1] == Mode.OPERATIONAL
         assert off[-1] < 0.1
+
+
+def test_a_robot_that_nobody_has_located_in_that_office_is_found_by_its_contours(shared_data, seeds):
+    """By half a view, on a map that others have drawn, and never elsewhere."""
+    floor, found, worst = read_floor_map(shared_data / "maps" / "utexas_gdc_3" / "3.yaml"), [], 0.0
+    for seed in seeds(2, 40):
+        office = drive(floor, seed)
+        columns = office.localized(told=False)
+        off = np.hypot(*(columns.means - office.poses)[:, :2].T)
+        found.append(np.flatnonzero(columns.modes != Mode.INITIALIZING)[0] / LASER.rate)
+        worst = max(worst, off[columns.modes == Mode.OPERATIONAL].max())
+    told = f"median {np.median(found):.1f} s, 95 % {np.quantile(found, 0.95):.1f} s, at worst {max(found):.1f} s"
+    print(f"found after {told}; operational: {worst:.2f} m off at most")  # noqa: T201 - figures of the README
+    assert np.median(found) < 8.0
+    assert max(found) < 40.0
+    assert worst < 0.5
+
+
+def test_a_robot_that_is_carried_through_that_office_is_found_by_its_contours(shared_data, seeds):
+    """Operational and wrong until it is lost, for four seconds; never after."""
+    floor, again, late = read_floor_map(shared_data / "maps" / "utexas_gdc_3" / "3.yaml"), [], 0
+    for seed in seeds(2, 20):
+        whole = drive(floor, seed)
+        first = len(whole.poses) // 3
+        last = first + int(np.random.default_rng(seed).integers(20, len(whole.poses) // 2))
+        office = whole.carried(first, last)
+        columns = office.localized()
+        off = np.hypot(*(columns.means - office.poses)[:, :2].T)
+        operational = columns.modes == Mode.OPERATIONAL
+        lost = int(np.flatnonzero(columns.modes[first:] == Mode.LOST)[0]) + first
+        again.append((np.flatnonzero(operational[lost:])[0]) / LASER.rate)
+        late = max(late, int((operational & (off > 0.5))[:lost].sum()))
+        assert not (operational & (off > 0.5))[lost:].any()
+    told = f"median {np.median(again):.1f} s, at worst {max(again):.1f} s after it was lost"
+    print(f"operational {told}; operational and wrong for {late} scans at most before")  # noqa: T201 - README
+    assert np.median(again) < 12.0
+    assert max(again) < 25.0
+    assert late <= 20
+
+
+def test_a_robot_whose_hall_the_map_does_not_show_is_not_found_on_it(shared_data, seeds):
+    office = read_floor_map(shared_data / "maps" / "utexas_gdc_3" / "3.yaml")
+    for seed in seeds(1, 8):
+        site = ("warehouse", "loading_bay", "assembly", "shop_floor")[seed % 4]
+        elsewhere = drive(read_floor_map(REPOSITORY / "maps" / site / "map.yaml"), seed, 20.0)
+        others = map_of_others(office, np.random.default_rng(seed))
+        columns = dataclasses.replace(elsewhere, floor=others).localized(told=False)
+        assert not (columns.modes == Mode.OPERATIONAL).any()
 
 
 @pytest.mark.with_all_seeds

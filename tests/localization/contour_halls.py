@@ -25,6 +25,21 @@ def room(width: float = 9.0, height: float = 7.0, *, resolution: float = 0.05, o
     return FloorMap(cells, resolution, np.array(origin))
 
 
+def divided_room(width: float = 20.0, height: float = 14.0) -> FloorMap:
+    """A room that walls without a pattern divide, with doors of 1.5 m."""
+    whole = room(width, height)
+    cells = whole.cells.copy()
+    rows, columns = cells.shape
+    cells[10 : rows - 120, 150:152] = OCCUPIED
+    cells[60:90, 150:152] = FREE
+    cells[rows - 110 : rows - 108, 40 : columns - 130] = OCCUPIED
+    cells[rows - 110 : rows - 108, 180:210] = FREE
+    cells[80 : rows - 40, columns - 125 : columns - 123] = OCCUPIED
+    cells[80:82, columns - 125 : columns - 70] = OCCUPIED
+    cells[150:170, columns - 60 : columns - 10] = OCCUPIED
+    return FloorMap(cells, whole.resolution, whole.origin)
+
+
 def corridor(length: float = 60.0, width: float = 2.0, *, resolution: float = 0.05, yaw: float = 0.0) -> FloorMap:
     """Two long walls and no end within reach of a scanner."""
     rows, columns = round(width / resolution), round(length / resolution)

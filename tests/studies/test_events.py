@@ -13,7 +13,7 @@ from commission.geometry.arrays import read_only
 from commission.localization.estimate import Mode, Status
 from commission.localization.growing_run import GrowingRun
 from commission.localization.priors import KeptPriors, PriorRows
-from commission.localization.search_state import NOTHING, SearchMoment
+from commission.localization.search_state import NOTHING, Agreed, SearchMoment
 from commission.site.records import Detections, Odometry
 from commission.studies.events import MOST_OF_A_KIND, EventKind, EventsInput, RunEvent, events, told
 from commission.studies.run import RunResult
@@ -100,12 +100,13 @@ def test_what_is_not_searched_for_is_not_found(run: RunResult) -> None:
 @pytest.mark.parametrize(
     ("agreed", "by"),
     [
-        ((4, 0), "the only place left in 5 attempts"),
-        ((1, 2), "the only place left in 3 attempts by the whole way"),
+        (Agreed(by_things=4), "the only place left in 5 attempts"),
+        (Agreed(by_things=1, by_way=2), "the only place left in 3 attempts by the whole way"),
+        (Agreed(by_things=1, by_contours=7), "the only place left in 8 views by the contours of the hall"),
     ],
 )
 def test_a_drive_that_nobody_has_located_says_so_and_when_and_how_it_was_found(
-    run: RunResult, agreed: tuple[int, int], by: str
+    run: RunResult, agreed: Agreed, by: str
 ) -> None:
     searches = (SearchMoment(24, read_only(np.empty((0, 13))), NOTHING, agreed),)
     run = replace(run, columns=replace(run.columns, searches=searches))

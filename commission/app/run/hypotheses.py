@@ -56,7 +56,7 @@ def _line(rank: int, found: Hypothesis) -> str:
         f"{x:.2f}, {y:.2f}",
         DEGREES.number(heading, ".1f"),
         MILLIMETRES.number(position, ".0f"),
-        str(found.fits),
+        f"{found.fits} %" if found.by_contours else str(found.fits),
     )
     return "<tr>" + "".join(f"<td>{each}</td>" for each in cells) + "</tr>"
 

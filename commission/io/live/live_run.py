@@ -210,7 +210,7 @@ class LiveRun:
     def _start_at(self, stamp_ns: int) -> Start:
         """Return where the vehicle starts, if it does at a time [ns]."""
         if self._pose is None:
-            return unknown_start_at(stamp_ns, self._setup.reflectors.centers)
+            return unknown_start_at(stamp_ns, self._setup.reflectors.centers, self._setup.contour_floor)
         return Start(belief_at(stamp_ns, self._pose, self._sigmas), self._origin)
 
     def _forget(self, run: GrowingRun) -> None:

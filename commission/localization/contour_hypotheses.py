@@ -1,0 +1,244 @@
+"""Hypotheses of where a vehicle is by the contours of the hall: what a scan suggests, judged view by view on the way.
+
+Each attempt looks in the whole hall and leads what was found before along; beams that end where the map has walls speak
+for a place, those that end behind them against it. Halls repeat: which of them it is, the way tells. Whether the first
+one is believed is `relocalization`'s.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from commission.compiled import compiled
+from commission.geometry.angles import wrap
+from commission.geometry.arrays import FloatArray, read_only
+from commission.geometry.ray_kernels import RayTables
+from commission.geometry.se2 import compose, inverse
+from commission.localization.contour import ContourModel, lever_of, scan_points
+from commission.localization.contour_match import GridPose, MatchRule, information_of, match
+from commission.localization.contour_scans import scan_seen_by
+from commission.localization.contour_search import places_of
+from commission.localization.contour_sight import share_through_walls
+from commission.localization.contour_tables import ContourTables
+from commission.localization.hypotheses import base_poses, each_place_once, prior_of, times_in_a_row
+from commission.localization.hypothesis_fit import ROW, density
+from commission.localization.odometry import Motion
+from commission.localization.search_map import SearchMap
+from commission.localization.search_state import ContourViews, Search
+from commission.localization.seen_of_late import SeenScan
+from commission.localization.wall_depth import WallDepth, deepened
+from commission.localization.wall_evidence import MOST_FOR, log_walls
+
+FEWEST_POINTS = 40
+"""Points of a scan by which a place is looked for at least."""
+MATCHED_BY = 180
+"""Points with which places are compared."""
+BEAMS = 60
+"""Beams of which it is asked where they end."""
+NEW_VIEW_M, NEW_VIEW_RAD = 0.5, 0.4
+"""A view counts again after that way or turn [m], [rad]: before, it is the same one."""
+KEPT = 0.7
+"""Share of what earlier views said that counts beside the newest one: a place that was overlooked still catches up."""
+HYPOTHESES = 16
+"""Places that are led along."""
+ODDS = 1e5
+"""How much likelier one place must be than all others together, and than that the scan is of none of them."""
+LEAST_MATCHED = 0.7
+"""Share of the points that must lie on contours at a place that is believed: half as much lie there by chance."""
+MOST_THROUGH = 0.15
+"""Share of the beams that may have gone through walls there."""
+STANDING = 0.5
+"""What an attempt counts that only has the view of the one before."""
+PERIOD_S = 0.4
+"""Time between two attempts at least [s]."""
+PATIENCE, LONGEST_PERIOD_S = 0.02, 10.0
+"""Share of the time of the search that lies between two attempts, and how long that is at most [s]."""
+POSITION_SIGMA, HEADING_SIGMA = 0.15, 0.05
+"""1-sigma of a place that is believed [m], [rad]: the filter matches anew from there."""
+_U, _V, _T, _MATCHED, _THROUGH, _SAID = range(6)
+
+
+class _Scan(NamedTuple):
+    """A scan, made ready."""
+
+    points: FloatArray
+    """(n, 2) [cells of the tables], base frame."""
+    scanner: tuple[float, float]
+    """Where it was seen from, in base [cells]."""
+    beams: FloatArray
+    """(B, 4) start x, y [m] and direction [rad] in base, length [m]."""
+
+
+@compiled
+def judge_places(  # noqa: PLR0917 - places and a scan, array by array
+    starts: FloatArray,
+    lever: float,
+    points: FloatArray,
+    scanner_x: float,
+    scanner_y: float,
+    tables: ContourTables,
+    rule: MatchRule,
+    judged: FloatArray,
+) -> None:
+    """Match a scan from each start, and say how much of it lies on contours there.
+
+    Parameters
+    ----------
+    starts : (n, 3) u, v [cells], heading [rad].
+    lever, points, tables, rule : as in `match`.
+    scanner_x, scanner_y : the scanner in base [cells].
+    judged : (n, 6) out: u, v, heading, share of the points matched, share of the beams through walls; the last one is
+        not written.
+
+    Notes
+    -----
+    No formula: `match`, `information_of`, `share_through_walls` in turn.
+    """
+    for k in range(len(starts)):
+        found = match(GridPose(starts[k, 0], starts[k, 1], starts[k, 2]), lever, points, tables, rule)
+        at = information_of(found.pose, lever, points, tables, rule.length, found.threshold)
+        judged[k, 0], judged[k, 1], judged[k, 2] = found.pose.u, found.pose.v, found.pose.theta
+        judged[k, 3] = at.beams / len(points)
+        judged[k, 4] = share_through_walls(found.pose, points, scanner_x, scanner_y, tables)
+
+
+@compiled
+def beams_say(poses: FloatArray, beams: FloatArray, walls: RayTables, said: FloatArray) -> None:
+    """Write what the ends of beams say of each pose.
+
+    Parameters
+    ----------
+    poses : (n, 3) of base [m, m, rad], map frame.
+    beams : (B, 4) start x, y [m] and direction [rad] in base, length [m].
+    walls : of the floor map.
+    said : (n,) out: log of how much likelier they are there than anywhere else.
+
+    Notes
+    -----
+    No formula: `log_walls`.
+    """
+    for k in range(len(poses)):
+        said[k] = log_walls(poses[k, 0], poses[k, 1], poses[k, 2], beams, walls)
+
+
+def seen_again(search: Search, scan: SeenScan, motion: Motion, depth: WallDepth, around: SearchMap) -> Search:
+    """Judge hypotheses by the contours of the newest scan, and new ones that it suggests.
+
+    Parameters
+    ----------
+    search : with the scan taken in.
+    scan : what was seen.
+    motion : odometry before the scan: the vehicle moves while the beam turns.
+    depth : how far behind the drawn faces walls are known to be.
+    around : the map to search.
+    """
+    contours, known = around.contours, search.contours
+    waits = min(max(PERIOD_S, PATIENCE * (scan.stamp_ns - search.since_ns) * 1e-9), LONGEST_PERIOD_S)
+    if contours is None or scan.stamp_ns - known.judged_ns < waits * 1e9:
+        return search
+    seen = _made_ready(scan, motion, contours.model, contours.sweep_rows)
+    if len(seen.points) < FEWEST_POINTS:
+        return search
+    tables, track = deepened(contours.model.tables, depth.depth), np.array(search.track[:3])
+    moved = compose(inverse(known.view), track) if known.judged_ns >= search.since_ns else np.full(3, math.inf)
+    is_new = math.hypot(*moved[:2]) >= NEW_VIEW_M or abs(moved[2]) >= NEW_VIEW_RAD or known.scanner != scan.scanner
+    led, before = base_poses(known.hypotheses, search.track), known.past
+    if is_new:
+        before = KEPT * (known.past + known.said)
+    starts = _in_cells(led, tables)
+    if is_new or not len(led):
+        lever = lever_of(seen.points)
+        found = places_of(seen.points, lever, seen.scanner, tables, contours.floor, contours.model.rule)
+        chosen = found[:, :3] * (tables.resolution, tables.resolution, 1.0)
+        found = found[each_place_once(chosen, HYPOTHESES)]
+        starts, before = np.concatenate((starts, found[:, :3])), np.append(before, np.zeros(len(found)))
+    judged = _judged(starts, seen, tables, contours.model.rule, around.walls)
+    poses = _in_map(judged[:, :3], tables)
+    ranked = _ranked(poses, judged, before, search, around, is_new)
+    view = tuple(track.tolist()) if is_new else known.view
+    hypotheses, past, said = ranked
+    return replace(
+        search,
+        contours=ContourViews(
+            hypotheses=read_only(hypotheses),
+            past=read_only(past),
+            said=read_only(said),
+            judged_ns=scan.stamp_ns,
+            view=(view[0], view[1], view[2]),
+            scanner=scan.scanner,
+        ),
+    )
+
+
+def _made_ready(scan: SeenScan, motion: Motion, model: ContourModel, sweep_rows: FloatArray) -> _Scan:
+    """Return the points of a scan at its stamp, and the beams that have come to them."""
+    per_cell = 1.0 / model.tables.resolution
+    at = scan.observation.mount_x, scan.observation.mount_y
+    whole = scan.ranges()
+    if whole is None:
+        return _Scan(np.empty((0, 2)), at, np.empty((0, 4)))
+    seen = scan_seen_by(whole, scan.scanner, scan.observation, sweep_rows)
+    points = np.empty((len(seen.ranges), 2))
+    points = points[: scan_points(seen, model, motion, scan.following, points)]
+    few = points[:: max(1, len(points) // BEAMS)] / per_cell - at
+    start = np.broadcast_to(at, (len(few), 2))
+    beams = np.column_stack((start, np.arctan2(few[:, 1], few[:, 0]), np.hypot(few[:, 0], few[:, 1])))
+    return _Scan(read_only(points), (at[0] * per_cell, at[1] * per_cell), read_only(beams))
+
+
+def _judged(starts: FloatArray, seen: _Scan, tables: ContourTables, rule: MatchRule, walls: RayTables) -> FloatArray:
+    """(n, 6) where a scan matches from each start [cells, rad], how well, and what its beams say of that."""
+    judged, said = np.empty((len(starts), 6)), np.empty(len(starts))
+    few = read_only(np.ascontiguousarray(seen.points[:: max(1, len(seen.points) // MATCHED_BY)]))
+    judge_places(read_only(starts), lever_of(few), few, *seen.scanner, tables, rule, judged)
+    beams_say(read_only(_in_map(judged[:, :3], tables)), seen.beams, walls, said)
+    judged[:, _SAID] = said
+    return judged
+
+
+def _ranked(  # noqa: PLR0917 - places and what is known of them
+    poses: FloatArray, judged: FloatArray, before: FloatArray, search: Search, around: SearchMap, is_new: bool
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Hypotheses by their evidence, each place once, what earlier views and what the newest one say of each.
+
+    Those that were led along come first among `poses`: they keep what was said of them.
+    """
+    contours, known = around.contours, search.contours
+    prior = prior_of(search, around)
+    even = math.exp(prior.log_even)
+    favors = [min(math.log(density(prior, *pose) / even), MOST_FOR) for pose in poses.tolist()]
+    evidence = before + judged[:, _SAID] + favors
+    kept = each_place_once(poses, len(poses))
+    kept = kept[np.argsort(-evidence[kept], kind="stable")][:HYPOTHESES]
+    rows = np.zeros((len(kept), ROW))
+    rows[:, :3] = compose(poses[kept], inverse(search.track[:3]))
+    rows[:, [3, 6]], rows[:, 8] = POSITION_SIGMA**2, HEADING_SIGMA**2
+    rows[:, 9] = evidence[kept]
+    rows[:, 10] = np.round(100.0 * judged[kept, _MATCHED])
+    if contours is not None and len(rows) and _is_alone(evidence[kept], judged[kept[0]]):
+        times = times_in_a_row(rows, known.hypotheses, search.track)
+        rows[0, 11] = times if is_new else times - 1.0 + STANDING
+    return rows, before[kept], judged[kept, _SAID]
+
+
+def _is_alone(evidence: FloatArray, best: FloatArray) -> bool:
+    """Whether the first place is far likelier than all others and than none, and fits by itself."""
+    others = float(np.exp(np.minimum(evidence[1:] - evidence[0], 0.0)).sum()) + math.exp(min(-evidence[0], 0.0))
+    return others * ODDS <= 1.0 and bool(best[_MATCHED] >= LEAST_MATCHED and best[_THROUGH] <= MOST_THROUGH)
+
+
+def _in_map(places: FloatArray, tables: ContourTables) -> FloatArray:
+    """(n, 3) poses of base [m, m, rad], map frame, of u, v [cells] and heading: the inverse of `to_grid`."""
+    at = (places[:, :2] + 0.5) * tables.resolution
+    T_map_grid = inverse((tables.x, tables.y, tables.theta))
+    return compose(T_map_grid, np.column_stack((at, places[:, 2])))
+
+
+def _in_cells(poses: FloatArray, tables: ContourTables) -> FloatArray:
+    """(n, 3) u, v [cells] and heading of poses of base in the map, as `to_grid` has them."""
+    at = compose(np.array((tables.x, tables.y, tables.theta)), poses)
+    return np.column_stack((at[:, :2] / tables.resolution - 0.5, wrap(at[:, 2])))
