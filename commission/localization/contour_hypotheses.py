@@ -62,7 +62,7 @@ POSITION_SIGMA, HEADING_SIGMA = 0.15, 0.05
 _U, _V, _T, _MATCHED, _THROUGH, _SAID = range(6)
 
 
-class _Scan(NamedTuple):
+class _ReadyScan(NamedTuple):
     """A scan, made ready."""
 
     points: FloatArray
@@ -174,23 +174,25 @@ def seen_again(search: Search, scan: SeenScan, motion: Motion, depth: WallDepth,
     )
 
 
-def _made_ready(scan: SeenScan, motion: Motion, model: ContourModel, sweep_rows: FloatArray) -> _Scan:
+def _made_ready(scan: SeenScan, motion: Motion, model: ContourModel, sweep_rows: FloatArray) -> _ReadyScan:
     """Return the points of a scan at its stamp, and the beams that have come to them."""
     per_cell = 1.0 / model.tables.resolution
     at = scan.observation.mount_x, scan.observation.mount_y
     whole = scan.ranges()
     if whole is None:
-        return _Scan(np.empty((0, 2)), at, np.empty((0, 4)))
+        return _ReadyScan(np.empty((0, 2)), at, np.empty((0, 4)))
     seen = scan_seen_by(whole, scan.scanner, scan.observation, sweep_rows)
     points = np.empty((len(seen.ranges), 2))
     points = points[: scan_points(seen, model, motion, scan.following, points)]
     few = points[:: max(1, len(points) // BEAMS)] / per_cell - at
     start = np.broadcast_to(at, (len(few), 2))
     beams = np.column_stack((start, np.arctan2(few[:, 1], few[:, 0]), np.hypot(few[:, 0], few[:, 1])))
-    return _Scan(read_only(points), (at[0] * per_cell, at[1] * per_cell), read_only(beams))
+    return _ReadyScan(read_only(points), (at[0] * per_cell, at[1] * per_cell), read_only(beams))
 
 
-def _judged(starts: FloatArray, seen: _Scan, tables: ContourTables, rule: MatchRule, walls: RayTables) -> FloatArray:
+def _judged(
+    starts: FloatArray, seen: _ReadyScan, tables: ContourTables, rule: MatchRule, walls: RayTables
+) -> FloatArray:
     """(n, 6) where a scan matches from each start [cells, rad], how well, and what its beams say of that."""
     judged, said = np.empty((len(starts), 6)), np.empty(len(starts))
     few = read_only(np.ascontiguousarray(seen.points[:: max(1, len(seen.points) // MATCHED_BY)]))

@@ -31,6 +31,9 @@ from commission.localization.contour import (
     CONTRADICTED,
     LEARNED_DEPTH,
     LEARNED_INFORMATION,
+    MATCHED,
+    MATCHED_ANYWHERE,
+    POINTS,
     REJECTED,
     ROWS,
     USE,
@@ -418,13 +421,15 @@ def said_by_contours(look: ContourLook | None) -> float:
     Notes
     -----
     No formula: accepted, or rejected or contradicted. In a corridor they tell two of place and heading, which fit
-    everywhere along it;
-    where they do not fit, the pose is wrong for all that.
+    everywhere along it; where they do not fit, the pose is wrong for all that. Of a scan of which less than half lies
+    on contours some pose would be accepted anywhere: it speaks for none.
     """
     if look is None:
         return 0.0
     use = look.figures[USE]
     if use == ACCEPTED:
+        if look.figures[MATCHED] < MATCHED_ANYWHERE * look.figures[POINTS]:
+            return 0.0
         return 1.0 if look.figures[ROWS] == WHOLE_POSE else 0.5
     return -1.0 if use in (REJECTED, CONTRADICTED) else 0.0
 
