@@ -6,8 +6,9 @@
 (() => {
   if (window.commissionFiles) return; // the server sends this script again after each reconnection
   window.commissionFiles = true;
-  const LOOK_EVERY_MS = 400, MOST_RECENT = 8, KEY = "commission-recent", SENT_WITHIN_MS = 4_000, TAKEN_WITHIN_MS = 4_000, MOST_REFUSED = 3;
+  const LOOK_EVERY_MS = 400, MOST_RECENT = 8, KEY = "commission-recent", SENT_WITHIN_MS = 4_000, ASKED_WITHIN_MS = 10_000, MOST_REFUSED = 3;
   const MAPS = /\.(yaml|yml|pgm|png|jpe?g|bmp|tiff?|dxf|stl|obj|glb|ply)$/i;
+  const MAP_FILE = /\.ya?ml$/i; // of ROS: it says where its image lies
   const IMPORTS = /\.(csv|txt|imk|json|lif|xml|zip|smap|tsv)$/i;
   const RECORDINGS = /\.(mcap|bag|db3|pcap|pcapng|log|clf|npz|cdr)$/i;
   let count = 0, open = null; // of the field that is being filled: {kind, uuid, input}
@@ -159,13 +160,15 @@
     }
     return null;
   }
-  // The program locks the button while it looks at a file; how long it takes until then is the computer's business.
-  async function untilLocked(label) {
-    const end = performance.now() + TAKEN_WITHIN_MS;
-    while (performance.now() < end && !buttonNamed(label)?.disabled) await new Promise((done) => setTimeout(done, 20));
+  // A ROS map that is read asks for its image; how long it takes until then is the computer's business.
+  async function imageAskedFor(map) {
+    const end = performance.now() + ASKED_WITHIN_MS;
+    const asks = () => [...document.querySelectorAll(".c-needs-image")].find((each) => each.dataset.map === map)?.dataset.image;
+    while (performance.now() < end && !asks()) await new Promise((done) => setTimeout(done, 20));
+    return asks();
   }
   const labelOf = (file) => MAPS.test(file.name) ? "Upload a map" : "Upload a file";
-  // Returns why the file was not taken; nothing where it was.
+  // Returns why the file was not taken; nothing where it was. `before`: what was sent of this drop, by its button.
   async function take(file, isFolder, before) {
     if (isFolder) return `${file.name} is a folder: drop the files that are in it`;
     if (file.size === 0) return `${file.name} is empty: 0 bytes`;
@@ -178,15 +181,21 @@
     if (!isMap && !IMPORTS.test(file.name)) {
       return `${file.name} is neither a floor map nor a file of reflectors, routes or a project`;
     }
-    const button = await buttonOf(labelOf(file), isMap ? "Floor map" : "Exchange");
-    const input = button && document.getElementById(`file_upload_${button.id}`);
-    if (!input || button.disabled) {
-      return `${file.name} was not taken: ${before || "another file"} is being looked at; accept or cancel that first`;
+    const label = labelOf(file), first = before.get(label);
+    const busy = `${file.name} was not taken: ${first ?? "another file"} is being looked at; accept or cancel that first`;
+    if (first) { // one file at a time, but for a ROS map and its image
+      const image = MAP_FILE.test(first) && !MAP_FILE.test(file.name) && await imageAskedFor(first);
+      if (!image) return busy;
+      if (image !== file.name) return `${file.name} was not taken: ${first} needs ${image}`;
     }
+    const button = await buttonOf(label, isMap ? "Floor map" : "Exchange");
+    const input = button && document.getElementById(`file_upload_${button.id}`);
+    if (!input || button.disabled) return busy;
     const one = new DataTransfer();
     one.items.add(file);
     input.files = one.files;
     input.dispatchEvent(new Event("change", { bubbles: true }));
+    before.set(label, file.name);
     return "";
   }
   addEventListener("dragover", (event) => {
@@ -200,16 +209,13 @@
     cover.hidden = true;
     const items = [...event.dataTransfer.items].filter((each) => each.kind === "file");
     const isFolder = items.map((each) => each.webkitGetAsEntry?.()?.isDirectory ?? false); // it is known only now
-    // A ROS map that comes behind its image finds it.
+    // A ROS map first: it asks for its image.
     const files = [...event.dataTransfer.files].map((file, index) => ({ file, isFolder: isFolder[index] }))
-      .sort((one, other) => /\.ya?ml$/i.test(one.file.name) - /\.ya?ml$/i.test(other.file.name));
-    let taken = null;
-    const refused = [];
+      .sort((one, other) => MAP_FILE.test(other.file.name) - MAP_FILE.test(one.file.name));
+    const before = new Map(), refused = [];
     for (const { file, isFolder } of files) {
-      if (taken) await untilLocked(labelOf(taken));
-      const why = await take(file, isFolder, taken?.name);
+      const why = await take(file, isFolder, before);
       if (why) refused.push(why);
-      else taken = file;
       if (refused.length === MOST_REFUSED) break;
     }
     const left = refused.length === MOST_REFUSED ? ` (${files.length} files were dropped)` : "";

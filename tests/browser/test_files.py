@@ -79,7 +79,7 @@ def test_files_are_found_by_looking_and_a_failed_open_changes_nothing(  # noqa: 
     assert served.state.project is project, "shown before, not after"
     page.press("Cancel")
     # Until the button is back, another file is still being looked at.
-    page.page.get_by_role("button", name="Upload a file").wait_for()
+    page.page.get_by_role("button", name="Upload a file").click(trial=True)
     # Folders and empty files hold nothing up; of two tables the second waits to be dropped again.
     folder = served.state.folder
     assert folder is not None
@@ -97,5 +97,14 @@ def test_files_are_found_by_looking_and_a_failed_open_changes_nothing(  # noqa: 
     page.wait_for_text("drive.mcap is a recording")
     page.page.evaluate(DROP, ["letter.docx", "x"])
     page.wait_for_text("letter.docx is neither a floor map")
+    # A map goes before the image that it names, however they are dropped; another image is told.
+    (folder / "floor.yaml").write_text("image: floor.pgm\nresolution: 0.05\norigin: [0.0, 0.0, 0.0]\n")
+    (folder / "floor.pgm").write_bytes(b"P5\n40 30\n255\n" + bytes([254] * 1200))
     assert served.state.project is project
+    (folder / "other.png").write_bytes(b"no image")
+    drop(page, *(str(folder / name) for name in ("other.png", "floor.pgm", "floor.yaml")))
+    page.wait_for_text("other.png was not taken: floor.yaml needs floor.pgm")
+    page.wait_for_text("floor.yaml: 2.0 x 1.5 m, cells of 50 mm")
+    assert served.state.project.floor_map is not None
+    assert served.state.project.floor_map.cells.shape == (30, 40)
     assert page.errors == []

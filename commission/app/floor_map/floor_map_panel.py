@@ -106,6 +106,8 @@ def said(loading: MapLoading) -> str:
     lines: list[str] = []
     if loading.waiting is not None:
         name, image = escaped(loading.waiting.file.name), escaped(loading.waiting.image)
-        lines.append(f"<div><b>{name}</b> needs its image: upload <b>{image}</b>, too.</div>")
+        # Where both were dropped together, the page's script sends it by that name (web_assets/files.js).
+        mark = f"class='c-needs-image' data-map='{name}' data-image='{image}'"
+        lines.append(f"<div {mark}><b>{name}</b> needs its image: upload <b>{image}</b>, too.</div>")
     lines += [f"<div class='c-note'>{escaped(note)}</div>" for note in loading.notes]
     return f"<div style='font-size:12px;padding:2px 6px;overflow-wrap:anywhere'>{''.join(lines)}</div>" if lines else ""
