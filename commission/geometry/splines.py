@@ -23,6 +23,8 @@ PIECE_TOLERANCE = 1e-11
 MAX_HALVINGS = 24
 # Bisection alone reaches the last bit in 53 halvings.
 MAX_INVERSION_STEPS = 60
+# Share of the whole that lies between two knots at least, if they are not equal: derivatives are divided by it.
+NARROWEST_GAP = 1e-12
 
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
@@ -254,6 +256,12 @@ def _checked_knots(values: ArrayLike, degree: int, n: int) -> FloatArray:
     if (counts > degree).any():
         i = int(np.argmax(counts))
         raise ValueError(f"inner knot {inner[i]:g} occurs {counts[i]} times; expected at most {degree} (the degree)")
+    gaps = np.diff(knots)
+    narrow = np.flatnonzero((gaps > 0.0) & (gaps < NARROWEST_GAP * (knots[-1] - knots[0])))
+    if narrow.size:
+        i = int(narrow[0])
+        text = f"knots[{i + 1}] lies {gaps[i]:g} after knots[{i}], of {knots[-1] - knots[0]:g} in all"
+        raise ValueError(f"{text}; expected equal knots, or at least {NARROWEST_GAP:g} of all between them")
     return knots
 
 

@@ -259,6 +259,13 @@ LINE = [[0, 0], [1, 0], [2, 0], [3, 0]]
         (1, LINE, [0, 0, 0, 1, 2, 2], None, "an end knot occurs more than 2 times"),
         (1, LINE, [0, 0, 0, 0, 0, 0], None, "an end knot occurs more than 2 times"),
         (1, LINE, [0, 0, 1, 1, 2, 2], None, "inner knot 1 occurs 2 times; expected at most 1"),
+        (
+            1,
+            LINE,
+            [0, 0, 1e-320, 1, 2, 2],
+            None,
+            r"knots\[2\] lies 9.99\S* after knots\[1\], of 2 in all; expected equal",
+        ),
         (3, LINE, None, [1, 1, 0, 1], r"weights\[2\] is 0; expected a number > 0"),
         (3, LINE, None, [1, 1, 1], r"weights has shape \(3,\); expected \(4\)"),
     ],
