@@ -52,7 +52,7 @@ LEAST_MATCHED = 0.7
 MOST_THROUGH = 0.15
 """Share of the beams that may have gone through walls there."""
 STANDING = 0.5
-"""What an attempt counts that only has the view of the one before."""
+"""What an attempt counts that only has the view of the one before: people in it come and go."""
 PERIOD_S = 0.4
 """Time between two attempts at least [s]."""
 PATIENCE, LONGEST_PERIOD_S = 0.02, 10.0
@@ -145,7 +145,10 @@ def seen_again(search: Search, scan: SeenScan, motion: Motion, depth: WallDepth,
         return search
     tables, track = deepened(contours.model.tables, depth.depth), np.array(search.track[:3])
     moved = compose(inverse(known.view), track) if known.judged_ns >= search.since_ns else np.full(3, math.inf)
-    is_new = math.hypot(*moved[:2]) >= NEW_VIEW_M or abs(moved[2]) >= NEW_VIEW_RAD or known.scanner != scan.scanner
+    is_new = math.hypot(*moved[:2]) >= NEW_VIEW_M or abs(moved[2]) >= NEW_VIEW_RAD
+    if not is_new and known.scanner != scan.scanner:
+        # Else two scanners of a vehicle that stands would take turns, each time a view that has not been there before.
+        return search
     led, before = base_poses(known.hypotheses, search.track), known.past
     if is_new:
         before = KEPT * (known.past + known.said)

@@ -131,31 +131,48 @@ def test_live_and_whole_run_agree_to_the_last_bit_while_contours_are_searched(re
         assert state_before(whole, log, cycle) == states[cycle]
 
 
-def test_two_scanners_that_look_elsewhere_find_the_vehicle_together() -> None:
-    office = hall_drive(3)
-    behind = dataclasses.replace(LASER, name="behind", mounting=np.array((-0.4, 0.0, np.pi)))
-    setup = setup_in(office.floor, scanners=(LASER, behind))
+BEHIND = dataclasses.replace(LASER, name="behind", mounting=np.array((-0.4, 0.0, np.pi)))
+
+
+def seen_by_both(poses: np.ndarray, office: Office) -> RecordLog:
+    """A drive of a vehicle with two scanners, which take turns."""
     caster = RayCaster(divided_room().occupancy())
     bearings = LASER.angle_min + LASER.angle_increment * np.arange(LASER.beam_count)
+    scan = office.records[1]
+    assert isinstance(scan, Scan)
     records: list[Record] = []
-    for k, pose in enumerate(office.poses):
-        odometry = office.records[2 * k]
-        assert isinstance(odometry, Odometry)
-        records.append(odometry)
-        for number, scanner in enumerate((LASER, behind)):
-            if (k + number) % 2:
-                continue
-            at = se2.compose(pose, scanner.mounting)
-            rays = np.column_stack((np.full(len(bearings), at[0]), np.full(len(bearings), at[1]), at[2] + bearings))
-            scan = office.records[1]
-            assert isinstance(scan, Scan)
-            ranges = caster.cast(rays, 30.0).astype(np.float32)
-            records.append(dataclasses.replace(scan, stamp_ns=odometry.stamp_ns + 1, ranges=ranges, scanner=number))
-    log = RecordLog.collect(records, (LASER.name, "behind"))
-    columns = run(log, setup, unlocated(setup))
+    for k, pose in enumerate(poses):
+        stamp_ns = round(k * 1e9 / LASER.rate)
+        records.append(Odometry(stamp_ns, se2.relative(poses[max(k - 1, 0)], pose)))
+        number = k // 2 % 2  # an attempt every 0.4 s meets both
+        at = se2.compose(pose, (LASER, BEHIND)[number].mounting)
+        rays = np.column_stack((np.full(len(bearings), at[0]), np.full(len(bearings), at[1]), at[2] + bearings))
+        ranges = caster.cast(rays, 30.0).astype(np.float32)
+        records.append(dataclasses.replace(scan, stamp_ns=stamp_ns + 1, ranges=ranges, scanner=number))
+    return RecordLog.collect(records, (LASER.name, BEHIND.name))
+
+
+def test_two_scanners_that_look_elsewhere_find_the_vehicle_together() -> None:
+    office = hall_drive(3)
+    setup = setup_in(office.floor, scanners=(LASER, BEHIND))
+    columns = run(seen_by_both(office.poses, office), setup, unlocated(setup))
     located = int(np.flatnonzero(columns.modes != Mode.INITIALIZING)[0])
     assert (off(columns, office.poses)[located:] < 0.25).all()
     assert columns.modes[-1] == Mode.OPERATIONAL
+
+
+def test_two_scanners_of_a_vehicle_that_stands_are_no_new_view_each_time() -> None:
+    office = hall_drive(3)
+    setup = setup_in(office.floor, scanners=(LASER, BEHIND))
+    standing = np.repeat(office.poses[:1], 40, axis=0)
+    columns = run(seen_by_both(standing, office), setup, unlocated(setup))
+    # Eight seconds are twenty attempts, by the one that was first: one view, and nineteen times half of it.
+    search = columns.final.search
+    assert search is not None
+    assert search.contours.scanner == 0
+    assert search.agreed.by_contours < CONFIRMED_BY_CONTOURS
+    assert len(search.told) > 0
+    assert (search.contours.past == 0.0).all()
 
 
 def test_a_scan_of_a_few_points_is_no_view() -> None:
