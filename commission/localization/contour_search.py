@@ -48,8 +48,6 @@ LOOKED_AT = 90
 """Points by which those that score best are looked at."""
 CHOSEN = 600
 """Places of the lattice that are."""
-FOUND = 24
-"""Places that are found at most."""
 
 
 class ScoredFloor(NamedTuple):
