@@ -24,7 +24,7 @@ from commission.localization.contour_scans import scan_seen_by
 from commission.localization.contour_search import places_of
 from commission.localization.contour_sight import share_through_walls
 from commission.localization.contour_tables import ContourTables
-from commission.localization.hypotheses import base_poses, each_place_once, prior_of, times_in_a_row
+from commission.localization.hypotheses import base_poses, each_place_once, others_beside, prior_of, times_in_a_row
 from commission.localization.hypothesis_fit import ROW, density
 from commission.localization.odometry import Motion
 from commission.localization.search_map import SearchMap
@@ -212,7 +212,6 @@ def _ranked(  # noqa: PLR0917 - places and what is known of them
 
     Those that were led along come first among `poses`: they keep what was said of them.
     """
-    contours, known = around.contours, search.contours
     prior = prior_of(search, around)
     even = math.exp(prior.log_even)
     favors = [min(math.log(density(prior, *pose) / even), MOST_FOR) for pose in poses.tolist()]
@@ -224,16 +223,17 @@ def _ranked(  # noqa: PLR0917 - places and what is known of them
     rows[:, [3, 6]], rows[:, 8] = POSITION_SIGMA**2, HEADING_SIGMA**2
     rows[:, 9] = evidence[kept]
     rows[:, 10] = np.round(100.0 * judged[kept, _MATCHED])
-    if contours is not None and len(rows) and _is_alone(evidence[kept], judged[kept[0]]):
-        times = times_in_a_row(rows, known.hypotheses, search.track)
+    if len(rows) and _is_alone(evidence[kept], judged[kept[0]]):
+        times = times_in_a_row(rows, search.contours.hypotheses, search.track)
         rows[0, 11] = times if is_new else times - 1.0 + STANDING
     return rows, before[kept], judged[kept, _SAID]
 
 
 def _is_alone(evidence: FloatArray, best: FloatArray) -> bool:
     """Whether the first place is far likelier than all others and than none, and fits by itself."""
-    others = float(np.exp(np.minimum(evidence[1:] - evidence[0], 0.0)).sum()) + math.exp(min(-evidence[0], 0.0))
-    return others * ODDS <= 1.0 and bool(best[_MATCHED] >= LEAST_MATCHED and best[_THROUGH] <= MOST_THROUGH)
+    return others_beside(evidence, 0.0) * ODDS <= 1.0 and bool(
+        best[_MATCHED] >= LEAST_MATCHED and best[_THROUGH] <= MOST_THROUGH
+    )
 
 
 def _in_map(places: FloatArray, tables: ContourTables) -> FloatArray:

@@ -251,11 +251,21 @@ def hypotheses_of(moment: SearchMoment) -> tuple[Hypothesis, ...]:
 
 def _is_alone(ranked: FloatArray, search: Search) -> bool:
     """Whether the first hypothesis is far likelier than all others, and than none."""
-    best = float(ranked[0, 9])
-    none = float(ranked[0, 12])
-    others = float(np.exp(np.minimum(ranked[1:, 9] - best, 0.0)).sum()) + math.exp(min(none - best, 0.0))
     count = len(certain_things(search))
+    others = others_beside(ranked[:, 9], float(ranked[0, 12]))
     return others * ODDS <= 1.0 and ranked[0, 10] >= max(FEWEST_FITS, LEAST_SHARE * count)
+
+
+def others_beside(evidence: FloatArray, none: float) -> float:
+    """Return how likely all other hypotheses and none of them are together, beside the first.
+
+    Parameters
+    ----------
+    evidence : (n,) logarithm of how likely each is, n at least 1.
+    none : the same of none of them.
+    """
+    best = float(evidence[0])
+    return float(np.exp(np.minimum(evidence[1:] - best, 0.0)).sum()) + math.exp(min(none - best, 0.0))
 
 
 def gaussian_of(best: FloatArray, track: PoseGaussian) -> PoseGaussian:
