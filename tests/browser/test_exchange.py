@@ -153,9 +153,11 @@ def test_pasted_cells_and_downloaded_files_make_the_round_trip(site: OpenSite, e
     page.wait_for_text("R1: y 2.000 → 2.100 m, moves 100 mm")
     page.press("Accept")
     site.until(lambda: site.ids[-1] == "N")
+    page.page.get_by_role("button", name="Accept", exact=True).wait_for(state="detached")
     for button, name in ((".imk", "Room.imk"), ("CSV", "Room_reflectors.csv"), ("LIF", "Room.lif")):
         with page.page.expect_download() as download:
             page.press(button)
+            page.wait_for_text(name)  # was sent, or does not hold all
         assert download.value.suggested_filename == name
         content = Path(download.value.path()).read_bytes()
         assert read_import(name, content) is not None
