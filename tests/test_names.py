@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -40,6 +41,12 @@ def names_in(path: Path, source: str) -> Iterator[str]:
             yield node.asname
 
 
+@functools.cache
+def named() -> dict[Path, frozenset[str]]:
+    """What each source names: all of them are read once."""
+    return {path: frozenset(names_in(path, path.read_text(encoding="utf-8"))) for path in SOURCES}
+
+
 def is_wrongly_guessed(name: str) -> bool:
     """Whether one of a name's words is retired; the sentences of tests may hold any."""
     words = name.lower().removesuffix("()").split("_")
@@ -49,16 +56,15 @@ def is_wrongly_guessed(name: str) -> bool:
 def test_no_name_is_one_that_newcomers_guess_wrongly() -> None:
     found = {
         f"{path.relative_to(REPOSITORY)}: {name}"
-        for path in SOURCES
-        for name in names_in(path, path.read_text(encoding="utf-8"))
+        for path, names in named().items()
+        for name in names
         if is_wrongly_guessed(name)
     }
     assert found == set()
 
 
 def test_every_handler_has_a_name() -> None:
-    for path in SOURCES:
-        assert "_()" not in names_in(path, path.read_text(encoding="utf-8")), path
+    assert [path for path, names in named().items() if "_()" in names] == []
 
 
 @pytest.mark.parametrize(

@@ -139,26 +139,31 @@ def promising(points: FloatArray, floor: ScoredFloor, turns: int, scores: IntArr
     -----
     max over headings of sum score(place + R p), by definition.
     """
-    count = len(points)
+    count, farthest = len(points), 0.0
+    for i in range(count):
+        farthest = max(farthest, math.hypot(points[i, 0], points[i, 1]))
+    # With room around it for the longest beam, no point lies outside of the table: a place in it is one number, and
+    # never a negative one, which would be counted from its end.
+    beside = math.ceil(farthest) + 1
     rows, columns = floor.scores.shape
-    ends = np.empty((turns, count, 2), dtype=np.int32)
+    width = columns + 2 * beside
+    padded = np.zeros((rows + 2 * beside) * width, dtype=np.uint8)
+    for row in range(rows):
+        first = (row + beside) * width + beside
+        padded[first : first + columns] = floor.scores[row]
+    ends = np.empty((turns, count), dtype=np.int64)
     for t in range(turns):
         c, s = math.cos(t * 2.0 * math.pi / turns), math.sin(t * 2.0 * math.pi / turns)
         for i in range(count):
-            ends[t, i, 0] = math.floor(s * points[i, 0] + c * points[i, 1] + 0.5)
-            ends[t, i, 1] = math.floor(c * points[i, 0] - s * points[i, 1] + 0.5)
+            down = math.floor(s * points[i, 0] + c * points[i, 1] + 0.5)
+            ends[t, i] = down * width + math.floor(c * points[i, 0] - s * points[i, 1] + 0.5)
     for place in range(len(floor.places)):
-        row, column = floor.places[place, 0], floor.places[place, 1]
+        at = (floor.places[place, 0] + beside) * width + floor.places[place, 1] + beside
         best, best_turn = -1, 0
         for t in range(turns):
-            total, left = 0, FULL_SCORE * count
+            total = 0
             for i in range(count):
-                v, u = row + ends[t, i, 0], column + ends[t, i, 1]
-                left -= FULL_SCORE
-                if 0 <= v < rows and 0 <= u < columns:
-                    total += floor.scores[v, u]
-                if total + left <= best:
-                    break
+                total += padded[np.uintp(at + ends[t, i])]
             if total > best:
                 best, best_turn = total, t
         scores[place], headings[place] = best, best_turn * 2.0 * math.pi / turns

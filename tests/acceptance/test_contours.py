@@ -274,7 +274,7 @@ def test_a_robot_whose_hall_the_map_does_not_show_is_not_found_on_it(shared_data
     office = read_floor_map(shared_data / "maps" / "utexas_gdc_3" / "3.yaml")
     for seed in seeds(1, 8):
         site = ("warehouse", "loading_bay", "assembly", "shop_floor")[seed % 4]
-        elsewhere = drive(read_floor_map(REPOSITORY / "maps" / site / "map.yaml"), seed, 20.0)
+        elsewhere = drive(read_floor_map(REPOSITORY / "maps" / site / "map.yaml"), seed, 10.0)
         others = map_of_others(office, np.random.default_rng(seed))
         columns = dataclasses.replace(elsewhere, floor=others).localized(told=False)
         assert not (columns.modes == Mode.OPERATIONAL).any()
