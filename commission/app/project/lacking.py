@@ -24,6 +24,18 @@ class Task:
     """Where on the page it is done, for the script `guide.js`; empty: it cannot be done yet."""
 
 
+def localizes_without(project: Project) -> str:
+    """Return what a pose follows from where there are no reflectors; empty: nothing.
+
+    Parameters
+    ----------
+    project : as edited now.
+    """
+    if project.parameters.contour.enabled and project.floor_map is not None:
+        return "contours of the floor map"
+    return "tags" if project.tags and project.parameters.tag.enabled else ""
+
+
 def tasks(project: Project, *, drives: bool) -> tuple[Task, ...]:
     """Return what there is to do, in order.
 
@@ -33,7 +45,10 @@ def tasks(project: Project, *, drives: bool) -> tuple[Task, ...]:
     drives : whether a run is on the page.
     """
     count, routes = len(project.reflectors), len(project.routes)
-    lacks = () if count >= FEWEST_REFLECTORS else ("reflectors",)
+    others = localizes_without(project)
+    enough = count >= FEWEST_REFLECTORS or bool(others)
+    by_hand = f"by clicks on the floor, {FEWEST_REFLECTORS} or more; or import a table"
+    lacks = () if enough else ("reflectors",)
     lacks += () if routes else ("a route",)
     return (
         Task(
@@ -44,8 +59,8 @@ def tasks(project: Project, *, drives: bool) -> tuple[Task, ...]:
         ),
         Task(
             "Place reflectors",
-            f"{count} placed" if count else f"by clicks on the floor, {FEWEST_REFLECTORS} or more; or import a table",
-            count >= FEWEST_REFLECTORS,
+            f"{count} placed" if count else f"none needed: {others} tell the pose" if others else by_hand,
+            enough,
             "tab:Selection press:Place",
         ),
         Task(
@@ -73,7 +88,8 @@ def lacking(project: Project, *, drives: bool) -> dict[str, str]:
     """
     count = len(project.reflectors)
     no_map = () if project.floor_map is not None else ("a floor map",)
-    few = () if count >= FEWEST_REFLECTORS else (f"reflectors ({count} of at least {FEWEST_REFLECTORS})",)
+    enough = count >= FEWEST_REFLECTORS or localizes_without(project)
+    few = () if enough else (f"reflectors ({count} of at least {FEWEST_REFLECTORS})",)
     no_route = () if project.routes else ("a route",)
     still = () if drives else ("a run",)
     of_each = {
