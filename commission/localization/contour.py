@@ -369,11 +369,11 @@ def observe_contours(  # noqa: PLR0917 - the filter's state around one scan
     rows = rows_of_match(belief, found.pose, found.threshold, lever, points, tables, model, figures)
     figures[ITERATIONS], figures[DEPTH] = found.iterations, walls.depth
     told = len(rows.residuals) if figures[MATCHED] >= model.least_matched * count else 0
+    x, y = scan.observation.mount_x / resolution, scan.observation.mount_y / resolution
     is_weak = told < WHOLE_POSE or figures[MATCHED] < WELL_MATCHED * count
     if told == 0 or (is_weak and not lost):
         # A single wall fits many places, and so do two with a few boxes: what else is seen has to fit as well.
         at = believed if told < WHOLE_POSE else found.pose
-        x, y = scan.observation.mount_x / resolution, scan.observation.mount_y / resolution
         if share_through_walls(at, points, x, y, model.tables) > MOST_THROUGH:
             figures[USE] = CONTRADICTED
             return belief
@@ -381,7 +381,6 @@ def observe_contours(  # noqa: PLR0917 - the filter's state around one scan
         figures[USE] = UNMATCHED
         return belief
     if lost:
-        x, y = scan.observation.mount_x / resolution, scan.observation.mount_y / resolution
         few = figures[MATCHED] < MATCHED_WHERE_LOST * count
         if few or share_through_walls(found.pose, points, x, y, model.tables) > MOST_THROUGH:
             figures[USE] = CONTRADICTED

@@ -18,13 +18,20 @@ from commission.geometry.angles import wrap
 from commission.geometry.arrays import FloatArray, read_only
 from commission.geometry.ray_kernels import RayTables
 from commission.geometry.se2 import compose, inverse
-from commission.localization.contour import ContourModel, lever_of, scan_points
+from commission.localization.contour import MOST_THROUGH, ContourModel, lever_of, scan_points
 from commission.localization.contour_match import GridPose, MatchRule, information_of, match
 from commission.localization.contour_scans import scan_seen_by
-from commission.localization.contour_search import places_of
+from commission.localization.contour_search import ScanPoints, places_of
 from commission.localization.contour_sight import share_through_walls
 from commission.localization.contour_tables import ContourTables
-from commission.localization.hypotheses import base_poses, each_place_once, others_beside, prior_of, times_in_a_row
+from commission.localization.hypotheses import (
+    ODDS,
+    base_poses,
+    each_place_once,
+    others_beside,
+    prior_of,
+    times_in_a_row,
+)
 from commission.localization.hypothesis_fit import ROW, density
 from commission.localization.odometry import Motion
 from commission.localization.search_map import SearchMap
@@ -45,18 +52,14 @@ KEPT = 0.7
 """Share of what earlier views said that counts beside the newest one: a place that was overlooked still catches up."""
 HYPOTHESES = 16
 """Places that are led along."""
-ODDS = 1e5
-"""How much likelier one place must be than all others together, and than that the scan is of none of them."""
 LEAST_MATCHED = 0.7
 """Share of the points that must lie on contours at a place that is believed: half as much lie there by chance."""
-MOST_THROUGH = 0.15
-"""Share of the beams that may have gone through walls there."""
 STANDING = 0.5
 """What an attempt counts that only has the view of the one before: people in it come and go."""
 PERIOD_S = 0.4
 """Time between two attempts at least [s]."""
-PATIENCE, LONGEST_PERIOD_S = 0.02, 10.0
-"""Share of the time of the search that lies between two attempts, and how long that is at most [s]."""
+LONGEST_PERIOD_S = 10.0
+"""Time between two attempts at most [s]."""
 POSITION_SIGMA, HEADING_SIGMA = 0.15, 0.05
 """1-sigma of a place that is believed [m], [rad]: the filter matches anew from there."""
 _U, _V, _T, _MATCHED, _THROUGH, _SAID = range(6)
@@ -65,32 +68,23 @@ _U, _V, _T, _MATCHED, _THROUGH, _SAID = range(6)
 class _ReadyScan(NamedTuple):
     """A scan, made ready."""
 
-    points: FloatArray
-    """(n, 2) [cells of the tables], base frame."""
-    scanner: tuple[float, float]
-    """Where it was seen from, in base [cells]."""
+    seen: ScanPoints
+    """Its points."""
     beams: FloatArray
     """(B, 4) start x, y [m] and direction [rad] in base, length [m]."""
 
 
 @compiled
-def judge_places(  # noqa: PLR0917 - places and a scan, array by array
-    starts: FloatArray,
-    lever: float,
-    points: FloatArray,
-    scanner_x: float,
-    scanner_y: float,
-    tables: ContourTables,
-    rule: MatchRule,
-    judged: FloatArray,
+def judge_places(
+    starts: FloatArray, scan: ScanPoints, tables: ContourTables, rule: MatchRule, judged: FloatArray
 ) -> None:
     """Match a scan from each start, and say how much of it lies on contours there.
 
     Parameters
     ----------
     starts : (n, 3) u, v [cells], heading [rad].
-    lever, points, tables, rule : as in `match`.
-    scanner_x, scanner_y : the scanner in base [cells].
+    scan : its points.
+    tables, rule : as in `match`.
     judged : (n, 6) out: u, v, heading, share of the points matched, share of the beams through walls; the last one is
         not written.
 
@@ -99,11 +93,11 @@ def judge_places(  # noqa: PLR0917 - places and a scan, array by array
     No formula: `match`, `information_of`, `share_through_walls` in turn.
     """
     for k in range(len(starts)):
-        found = match(GridPose(starts[k, 0], starts[k, 1], starts[k, 2]), lever, points, tables, rule)
-        at = information_of(found.pose, lever, points, tables, rule.length, found.threshold)
+        found = match(GridPose(starts[k, 0], starts[k, 1], starts[k, 2]), scan.lever, scan.points, tables, rule)
+        at = information_of(found.pose, scan.lever, scan.points, tables, rule.length, found.threshold)
         judged[k, 0], judged[k, 1], judged[k, 2] = found.pose.u, found.pose.v, found.pose.theta
-        judged[k, 3] = at.beams / len(points)
-        judged[k, 4] = share_through_walls(found.pose, points, scanner_x, scanner_y, tables)
+        judged[k, 3] = at.beams / len(scan.points)
+        judged[k, 4] = share_through_walls(found.pose, scan.points, scan.x, scan.y, tables)
 
 
 @compiled
@@ -137,11 +131,11 @@ def seen_again(search: Search, scan: SeenScan, motion: Motion, depth: WallDepth,
     around : the map to search.
     """
     contours, known = around.contours, search.contours
-    waits = min(max(PERIOD_S, PATIENCE * (scan.stamp_ns - search.since_ns) * 1e-9), LONGEST_PERIOD_S)
-    if contours is None or scan.stamp_ns - known.judged_ns < waits * 1e9:
+    waits_ns = search.waits_ns(scan.stamp_ns, PERIOD_S, LONGEST_PERIOD_S)
+    if contours is None or scan.stamp_ns - known.judged_ns < waits_ns:
         return search
-    seen = _made_ready(scan, motion, contours.model, contours.sweep_rows)
-    if len(seen.points) < FEWEST_POINTS:
+    ready = _made_ready(scan, motion, contours.model, contours.sweep_rows)
+    if len(ready.seen.points) < FEWEST_POINTS:
         return search
     tables, track = deepened(contours.model.tables, depth.depth), np.array(search.track[:3])
     moved = compose(inverse(known.view), track) if known.judged_ns >= search.since_ns else np.full(3, math.inf)
@@ -154,12 +148,11 @@ def seen_again(search: Search, scan: SeenScan, motion: Motion, depth: WallDepth,
         before = KEPT * (known.past + known.said)
     starts = _in_cells(led, tables)
     if is_new or not len(led):
-        lever = lever_of(seen.points)
-        found = places_of(seen.points, lever, seen.scanner, tables, contours.floor, contours.model.rule)
+        found = places_of(ready.seen, tables, contours.floor, contours.model.rule)
         chosen = found[:, :3] * (tables.resolution, tables.resolution, 1.0)
         found = found[each_place_once(chosen, HYPOTHESES)]
         starts, before = np.concatenate((starts, found[:, :3])), np.append(before, np.zeros(len(found)))
-    judged = _judged(starts, seen, tables, contours.model.rule, around.walls)
+    judged = _judged(starts, ready, tables, contours.model.rule, around.walls)
     poses = _in_map(judged[:, :3], tables)
     ranked = _ranked(poses, judged, before, search, around, is_new)
     view = tuple(track.tolist()) if is_new else known.view
@@ -183,24 +176,25 @@ def _made_ready(scan: SeenScan, motion: Motion, model: ContourModel, sweep_rows:
     at = scan.observation.mount_x, scan.observation.mount_y
     whole = scan.ranges()
     if whole is None:
-        return _ReadyScan(np.empty((0, 2)), at, np.empty((0, 4)))
+        return _ReadyScan(ScanPoints(np.empty((0, 2)), 0.0, *at), np.empty((0, 4)))
     seen = scan_seen_by(whole, scan.scanner, scan.observation, sweep_rows)
     points = np.empty((len(seen.ranges), 2))
     points = points[: scan_points(seen, model, motion, scan.following, points)]
     few = points[:: max(1, len(points) // BEAMS)] / per_cell - at
     start = np.broadcast_to(at, (len(few), 2))
     beams = np.column_stack((start, np.arctan2(few[:, 1], few[:, 0]), np.hypot(few[:, 0], few[:, 1])))
-    return _ReadyScan(read_only(points), (at[0] * per_cell, at[1] * per_cell), read_only(beams))
+    in_cells = ScanPoints(read_only(points), lever_of(points), at[0] * per_cell, at[1] * per_cell)
+    return _ReadyScan(in_cells, read_only(beams))
 
 
 def _judged(
-    starts: FloatArray, seen: _ReadyScan, tables: ContourTables, rule: MatchRule, walls: RayTables
+    starts: FloatArray, ready: _ReadyScan, tables: ContourTables, rule: MatchRule, walls: RayTables
 ) -> FloatArray:
     """(n, 6) where a scan matches from each start [cells, rad], how well, and what its beams say of that."""
     judged, said = np.empty((len(starts), 6)), np.empty(len(starts))
-    few = read_only(np.ascontiguousarray(seen.points[:: max(1, len(seen.points) // MATCHED_BY)]))
-    judge_places(read_only(starts), lever_of(few), few, *seen.scanner, tables, rule, judged)
-    beams_say(read_only(_in_map(judged[:, :3], tables)), seen.beams, walls, said)
+    few = ready.seen.thinned(MATCHED_BY)
+    judge_places(read_only(starts), few._replace(lever=lever_of(few.points)), tables, rule, judged)
+    beams_say(read_only(_in_map(judged[:, :3], tables)), ready.beams, walls, said)
     judged[:, _SAID] = said
     return judged
 

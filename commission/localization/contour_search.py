@@ -50,6 +50,27 @@ CHOSEN = 600
 """Places of the lattice that are."""
 
 
+class ScanPoints(NamedTuple):
+    """Points of a scan in cells of the tables, for kernels."""
+
+    points: FloatArray
+    """(n, 2) base frame."""
+    lever: float
+    """Cells that a radian counts for."""
+    x: float
+    """Where the scanner is, base frame."""
+    y: float
+
+    def thinned(self, most: int) -> ScanPoints:
+        """Return every k-th of them, so that there are about so many.
+
+        Parameters
+        ----------
+        most : of them; less than twice as many stay.
+        """
+        return self._replace(points=read_only(np.ascontiguousarray(self.points[:: max(1, len(self.points) // most)])))
+
+
 class ScoredFloor(NamedTuple):
     """Scores of contours, and the lattice of places, for kernels."""
 
@@ -170,23 +191,14 @@ def promising(points: FloatArray, floor: ScoredFloor, turns: int, scores: IntArr
 
 
 @compiled
-def looked_at(  # noqa: PLR0917 - places and the points
-    starts: FloatArray,
-    lever: float,
-    points: FloatArray,
-    scanner_x: float,
-    scanner_y: float,
-    tables: ContourTables,
-    rule: MatchRule,
-    found: FloatArray,
-) -> None:
+def looked_at(starts: FloatArray, scan: ScanPoints, tables: ContourTables, rule: MatchRule, found: FloatArray) -> None:
     """Match from each start with few steps, and say how badly points lie there.
 
     Parameters
     ----------
     starts : (n, 3) u, v [cells], heading [rad].
-    lever, points, tables, rule : as in `match`.
-    scanner_x, scanner_y : the scanner in base [cells].
+    scan : its points.
+    tables, rule : as in `match`.
     found : (n, 4) out: u, v, heading, and what it costs.
 
     Notes
@@ -197,27 +209,18 @@ def looked_at(  # noqa: PLR0917 - places and the points
     quick = MatchRule(False, WIDE, QUICK_ITERATIONS, rule.smallest_step, rule.largest_error, rule.sigma)
     for k in range(len(starts)):
         start = GridPose(starts[k, 0], starts[k, 1], starts[k, 2])
-        pose, _ = by_gauss_newton(start, lever, points, tables, quick, math.inf)
-        cost = cost_of(pose, lever, points, tables, NARROW, math.inf, False).total / len(points)
+        pose, _ = by_gauss_newton(start, scan.lever, scan.points, tables, quick, math.inf)
+        cost = cost_of(pose, scan.lever, scan.points, tables, NARROW, math.inf, False).total / len(scan.points)
         found[k, 0], found[k, 1], found[k, 2] = pose.u, pose.v, pose.theta
-        found[k, 3] = cost + share_through_walls(pose, points, scanner_x, scanner_y, tables)
+        found[k, 3] = cost + share_through_walls(pose, scan.points, scan.x, scan.y, tables)
 
 
-def places_of(  # noqa: PLR0917 - a scan and the map
-    points: FloatArray,
-    lever: float,
-    scanner: tuple[float, float],
-    tables: ContourTables,
-    floor: ScoredFloor,
-    rule: MatchRule,
-) -> FloatArray:
+def places_of(scan: ScanPoints, tables: ContourTables, floor: ScoredFloor, rule: MatchRule) -> FloatArray:
     """Return where in the whole hall a scan matches, the best first, some of them more than once.
 
     Parameters
     ----------
-    points : (n, 2) points of the scan [cells of the tables], base frame.
-    lever : cells that a radian counts for.
-    scanner : where it is in base [cells].
+    scan : its points.
     tables, floor : of the map.
     rule : how to match.
 
@@ -225,14 +228,13 @@ def places_of(  # noqa: PLR0917 - a scan and the map
     -------
     places : (P, 4) u, v [cells], heading [rad], and what it costs.
     """
-    few = thinned(points / floor.per_cell, BETWEEN_POINTS / floor.cell, MOST_POINTS)
+    few = thinned(scan.points / floor.per_cell, BETWEEN_POINTS / floor.cell, MOST_POINTS)
     scores, headings = np.empty(len(floor.places), dtype=np.int64), np.empty(len(floor.places))
     promising(read_only(few), floor, math.ceil(2.0 * math.pi / BETWEEN_TURNS), scores, headings)
     best = np.argsort(-scores, kind="stable")[:CHOSEN]
     # Whole numbers are the centers of cells.
     at = (floor.places[best, ::-1] + 0.5) * floor.per_cell - 0.5
     found = np.empty((len(best), 4))
-    looked = read_only(np.ascontiguousarray(points[:: max(1, len(points) // LOOKED_AT)]))
     starts = read_only(np.column_stack((at, headings[best])).astype(np.float64))
-    looked_at(starts, lever, looked, *scanner, tables, rule, found)
+    looked_at(starts, scan.thinned(LOOKED_AT), tables, rule, found)
     return found[np.argsort(found[:, 3], kind="stable")]

@@ -35,9 +35,6 @@ CONFIRMED_BY_CONTOURS = 8.0
 """Views in a row in which one place must be the only one left by the contours of the hall."""
 PERIOD_S = 0.1
 """Time between two attempts at least [s]."""
-PATIENCE = 0.02
-"""Share of the time of the search that lies between two attempts: what was not found in a minute comes no sooner by
-ten attempts a second."""
 LONGEST_PERIOD_S = 2.0
 """Time between two attempts at most [s]."""
 AROUND_M = 1.0
@@ -150,8 +147,7 @@ def sought(before: FilterState, after: FilterState, scan: SeenScan, around: Sear
         track, _ = reach(search.track, before.tracking.motion, scan.stamp_ns, scan.following, around.odometry)
     search = joined_scan(search, track, scan)
     now_ns, never_located = scan.stamp_ns, before.tracking.mode == Mode.INITIALIZING
-    waits = max(PERIOD_S * 1e9, min(PATIENCE * (now_ns - search.since_ns), LONGEST_PERIOD_S * 1e9))
-    if now_ns - search.judged_ns >= waits:
+    if now_ns - search.judged_ns >= search.waits_ns(now_ns, PERIOD_S, LONGEST_PERIOD_S):
         search = judged_again(search, now_ns, around)
         search = explained_again(search, None if never_located else after.tracking.belief, now_ns, around)
     search = seen_again(search, scan, before.tracking.motion, before.tracking.walls, around)

@@ -83,10 +83,10 @@ def search_map(setup: LocalizerSetup) -> SearchMap:
     ]
     close = KDTree(index.places[:, :2]).query_ball_point(index.places[:, :2], CLOSE) if len(rows) else []
     has_reflectors = setup.finds_by_reflectors
-    wide = anywhere(index.places, setup.contour_floor)
+    floor = setup.contour_floor
+    wide = anywhere(index.places, floor)
     longest = 2.0 * max((eye[4] for eye in eyes), default=1.0)
     table, contour = pair_table(index.places, longest), setup.contour
-    floor = setup.contour_floor
     return SearchMap(
         table,
         index,

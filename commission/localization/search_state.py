@@ -15,6 +15,10 @@ from commission.localization.sightings import COLUMNS
 from commission.localization.trail import no_trail
 from commission.localization.trail_fit import Trail
 
+PATIENCE = 0.02
+"""Share of the time of the search that lies between two attempts: what was not found in a minute comes no sooner by
+ten attempts a second."""
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ContourViews:
@@ -78,6 +82,16 @@ class Search:
         """Attempts in a row in which one place was left."""
         told = (self.hypotheses, self.explained, self.contours.hypotheses)
         return Agreed(*(int(each[0, 11]) if len(each) else 0 for each in told))
+
+    def waits_ns(self, now_ns: int, shortest: float, longest: float) -> float:
+        """Return the time between two attempts [ns].
+
+        Parameters
+        ----------
+        now_ns : now [ns].
+        shortest, longest : bounds of it [s].
+        """
+        return max(shortest * 1e9, min(PATIENCE * (now_ns - self.since_ns), longest * 1e9))
 
     def moment(self, cycle: int) -> SearchMoment:
         """Return what the search tells after a cycle.

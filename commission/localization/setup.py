@@ -172,7 +172,7 @@ class LocalizerSetup:
     @property
     def contour_floor(self) -> FloorMap | None:
         """The floor map whose contours are looked at; None: they are not."""
-        return self.floor if self.parameters.contour.enabled else None
+        return self.parameters.contour.seen_of(self.floor)
 
     @property
     def decides_over_scans(self) -> bool:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Annotated
 
 from commission.site.checks import check_fields
+from commission.site.floor_map import FloorMap
 from commission.site.odometry_growth import (
     FORWARD_PER_SQRT_M,
     FORWARD_PER_SQRT_S,
@@ -325,6 +326,15 @@ class ContourParameters:
     """Share of the matched beams that must tell a direction: along a corridor, no information is taken from walls."""
     gate_probability: Annotated[float, _gate("Accepted to")] = 0.999
     """Probability that a true match falls inside the validation gate."""
+
+    def seen_of(self, floor: FloorMap | None) -> FloorMap | None:
+        """Return the floor map whose walls scans are matched with; None: they are not.
+
+        Parameters
+        ----------
+        floor : of the site.
+        """
+        return floor if self.enabled else None
 
     def __post_init__(self) -> None:
         check_fields(self, "contour.")

@@ -151,7 +151,7 @@ def kinds_beside_ranges(project: Project | KindsInput) -> tuple[str, ...]:
     reels = project.reels if isinstance(project, KindsInput) else project.disturbances.reels
     has_goods = bool(reels) or (temporary.corners and project.floor_map is not None)
     there = {
-        CONTOURS: parameters.contour.enabled and project.floor_map is not None,
+        CONTOURS: parameters.contour.seen_of(project.floor_map) is not None,
         TAGS: parameters.tag.enabled and bool(project.tags),
         BEARINGS: parameters.bearing.enabled and any(each.is_goniometer for each in project.scanners),
         TEMPORARY: temporary.enabled and temporary.most > 0 and has_goods,

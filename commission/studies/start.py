@@ -69,7 +69,7 @@ def unknown_start(project: Project, log: RecordLog) -> Start:
     project : it says how large the floor is.
     log : the recording; not empty, else UsageError.
     """
-    floor = project.floor_map if project.parameters.contour.enabled else None
+    floor = project.parameters.contour.seen_of(project.floor_map)
     return unknown_start_at(_first_stamp(log), project.reflectors.centers, floor)
 
 

@@ -128,6 +128,12 @@ def poses_along(points: np.ndarray) -> np.ndarray:
     return np.array(poses)
 
 
+def ranges_from(caster: RayCaster, pose: np.ndarray, bearings: np.ndarray) -> np.ndarray:
+    """Ranges [m] of the beams of a scanner at a pose, without noise; inf where nothing is met."""
+    rays = np.column_stack((np.full(len(bearings), pose[0]), np.full(len(bearings), pose[1]), pose[2] + bearings))
+    return caster.cast(rays, LASER.range[1])
+
+
 def map_of_others(floor: FloorMap, rng: np.random.Generator) -> FloorMap:
     """The hall as they have mapped it: coarse, a tenth of the walls' cells missing, some of them one cell off."""
     every = round(CELL / floor.resolution)
@@ -148,8 +154,7 @@ def map_of_scans(floor: FloorMap, poses: np.ndarray, seed: int, *, cell: float =
     met = np.zeros((rows, columns), dtype=np.int64)
     bearings = np.radians(np.arange(-90.0, 90.01, 0.5))
     for pose in poses[::2]:
-        rays = np.column_stack((np.full(len(bearings), pose[0]), np.full(len(bearings), pose[1]), pose[2] + bearings))
-        ranges = caster.cast(rays, LASER.range[1]) + BEAM_SIGMA * rng.standard_normal(len(bearings))
+        ranges = ranges_from(caster, pose, bearings) + BEAM_SIGMA * rng.standard_normal(len(bearings))
         taken_for = pose + np.array((0.03, 0.03, 0.005)) * rng.standard_normal(3)
         back = np.isfinite(ranges)
         along = taken_for[2] + bearings[back]
@@ -181,8 +186,7 @@ def drive(floor: FloorMap, seed: int, metres: float = 60.0) -> Office:
         turned = math.sqrt(HEADING**2 * way + TURNING**2 * turn)
         noise = (FORWARD * math.sqrt(way), LATERAL * math.sqrt(way), turned)
         records.append(Odometry(stamp_ns, moved * scales[[0, 0, 1]] + noise * rng.standard_normal(3)))
-        rays = np.column_stack((np.full(len(bearings), pose[0]), np.full(len(bearings), pose[1]), pose[2] + bearings))
-        ranges = caster.cast(rays, LASER.range[1]) + BEAM_SIGMA * rng.standard_normal(len(bearings))
+        ranges = ranges_from(caster, pose, bearings) + BEAM_SIGMA * rng.standard_normal(len(bearings))
         for first in np.flatnonzero(rng.random(len(ranges)) < 0.012):
             legs = slice(first, first + rng.integers(3, 14))
             ranges[legs] = np.minimum(ranges[legs], rng.uniform(0.6, 4.0))

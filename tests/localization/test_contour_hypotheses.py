@@ -26,7 +26,7 @@ from commission.site.parameters import ContourParameters, Parameters
 from commission.site.record_log import RecordLog
 from commission.site.records import Odometry, Record, Scan
 from commission.site.reflectors import Reflector, ReflectorMap
-from tests.acceptance.office import LASER, Office, drive
+from tests.acceptance.office import LASER, Office, drive, ranges_from
 from tests.localization.contour_halls import divided_room, room
 
 BY_CONTOURS = Parameters(contour=ContourParameters(enabled=True))
@@ -146,8 +146,7 @@ def seen_by_both(poses: np.ndarray, office: Office) -> RecordLog:
         records.append(Odometry(stamp_ns, se2.relative(poses[max(k - 1, 0)], pose)))
         number = k // 2 % 2  # an attempt every 0.4 s meets both
         at = se2.compose(pose, (LASER, BEHIND)[number].mounting)
-        rays = np.column_stack((np.full(len(bearings), at[0]), np.full(len(bearings), at[1]), at[2] + bearings))
-        ranges = caster.cast(rays, 30.0).astype(np.float32)
+        ranges = ranges_from(caster, at, bearings).astype(np.float32)
         records.append(dataclasses.replace(scan, stamp_ns=stamp_ns + 1, ranges=ranges, scanner=number))
     return RecordLog.collect(records, (LASER.name, BEHIND.name))
 

@@ -15,7 +15,7 @@ from commission.geometry.angles import wrap
 from commission.geometry.arrays import read_only
 from commission.localization.contour import lever_of
 from commission.localization.contour_match import GridPose, MatchRule
-from commission.localization.contour_search import FULL_SCORE, places_of, promising, scored_floor, thinned
+from commission.localization.contour_search import FULL_SCORE, ScanPoints, places_of, promising, scored_floor, thinned
 from commission.localization.contour_tables import contour_tables
 from commission.localization.hypotheses import each_place_once
 from commission.site.floor_map import FREE, OCCUPIED, FloorMap
@@ -51,7 +51,7 @@ def cells_of(floor: FloorMap, pose: np.ndarray, longest: float = 20.0, beams: in
 def searched(floor: FloorMap, points: np.ndarray) -> np.ndarray:
     """(P, 3) poses in the map, each place once, the best first."""
     tables = contour_tables(floor)
-    found = places_of(points, lever_of(points), (0.0, 0.0), tables, scored_floor(floor), RULE)
+    found = places_of(ScanPoints(points, lever_of(points), 0.0, 0.0), tables, scored_floor(floor), RULE)
     poses = np.array([map_pose(floor, GridPose(*each)) for each in found[:, :3]])
     return poses[each_place_once(poses, 24)]
 
@@ -160,4 +160,5 @@ def test_a_map_without_a_wall_or_without_room_has_no_place() -> None:
         assert len(scored.places) == 0 or not scored.scores.any()
     full = FloorMap(np.full((40, 60), OCCUPIED, dtype=np.int8), 0.05, np.zeros(3))
     points = cells_of(room(), np.array((4.0, 3.6, 0.4)))
-    assert places_of(points, 1.0, (0.0, 0.0), contour_tables(full), scored_floor(full), RULE).shape == (0, 4)
+    scan = ScanPoints(points, 1.0, 0.0, 0.0)
+    assert places_of(scan, contour_tables(full), scored_floor(full), RULE).shape == (0, 4)

@@ -24,14 +24,14 @@ class Task:
     """Where on the page it is done, for the script `guide.js`; empty: it cannot be done yet."""
 
 
-def localizes_without(project: Project) -> str:
-    """Return what a pose follows from where there are no reflectors; empty: nothing.
+def _has_enough(project: Project) -> bool:
+    """Whether a pose follows from what is there."""
+    return len(project.reflectors) >= FEWEST_REFLECTORS or bool(_instead_of_reflectors(project))
 
-    Parameters
-    ----------
-    project : as edited now.
-    """
-    if project.parameters.contour.enabled and project.floor_map is not None:
+
+def _instead_of_reflectors(project: Project) -> str:
+    """Return what a pose follows from without reflectors; empty: nothing."""
+    if project.parameters.contour.seen_of(project.floor_map) is not None:
         return "contours of the floor map"
     return "tags" if project.tags and project.parameters.tag.enabled else ""
 
@@ -45,8 +45,7 @@ def tasks(project: Project, *, drives: bool) -> tuple[Task, ...]:
     drives : whether a run is on the page.
     """
     count, routes = len(project.reflectors), len(project.routes)
-    others = localizes_without(project)
-    enough = count >= FEWEST_REFLECTORS or bool(others)
+    others, enough = _instead_of_reflectors(project), _has_enough(project)
     by_hand = f"by clicks on the floor, {FEWEST_REFLECTORS} or more; or import a table"
     lacks = () if enough else ("reflectors",)
     lacks += () if routes else ("a route",)
@@ -88,8 +87,7 @@ def lacking(project: Project, *, drives: bool) -> dict[str, str]:
     """
     count = len(project.reflectors)
     no_map = () if project.floor_map is not None else ("a floor map",)
-    enough = count >= FEWEST_REFLECTORS or localizes_without(project)
-    few = () if enough else (f"reflectors ({count} of at least {FEWEST_REFLECTORS})",)
+    few = () if _has_enough(project) else (f"reflectors ({count} of at least {FEWEST_REFLECTORS})",)
     no_route = () if project.routes else ("a route",)
     still = () if drives else ("a run",)
     of_each = {
